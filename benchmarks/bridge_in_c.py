@@ -22,6 +22,8 @@ from typing import Any
 from benchmarks.figures import Figure, at_most, quantile, show
 from firmware_protocol import commands as c
 from firmware_protocol.framing import FrameDecoder, encode_frame
+from firmware_protocol.message import Request, Stamp
+from firmware_protocol.session import parse_reply, to_frame
 from mock_controller.device import build_device
 from mock_controller.options import Options
 from tests.firmware.compiled import BUILD, SOURCES, made
@@ -47,7 +49,7 @@ class Host:
         self._line_is_modelled = line_is_modelled
         self._decoder = FrameDecoder()
         self._sequence = 0
-        self._stamp = c.Stamp(0, 0)
+        self._stamp = Stamp(0, 0)
         self._replies: dict[int, Any] = {}
 
     def run_until(self, time_us: int) -> None:
@@ -55,20 +57,20 @@ class Host:
         while self.link.time_us < time_us:
             self.link.run_until(min(self.link.time_us + STEP_US, time_us))
             for frame in self._decoder.feed(self.link.take_output()):
-                self._replies[frame.sequence] = c.parse_reply(frame)
+                self._replies[frame.sequence] = parse_reply(frame)
 
-    def send(self, request: c.Request) -> int:
+    def send(self, request: Request) -> int:
         """Sends a request; returns its sequence number."""
         self._sequence += 1
         if request.IS_COMMAND:
-            self._stamp = c.Stamp(self._stamp.session, self._stamp.number + 1)
-        line = encode_frame(c.to_frame(self._sequence, request, self._stamp))
+            self._stamp = Stamp(self._stamp.session, self._stamp.number + 1)
+        line = encode_frame(to_frame(self._sequence, request, self._stamp))
         if not self._line_is_modelled:
             self.run_until(self.link.time_us + len(line) * 10_000_000 // BAUD)
         self.link.receive(line)
         return self._sequence
 
-    def ask(self, request: c.Request) -> Any:
+    def ask(self, request: Request) -> Any:
         """Returns the reply to a request."""
         sequence = self.send(request)
         give_up_us = self.link.time_us + 10 * PERIOD_US
@@ -81,7 +83,7 @@ class Host:
     def greet(self) -> None:
         """Begins a session."""
         reply = self.ask(c.Hello(c.PROTOCOL_VERSION, 0x600D0000 | self._sequence))
-        self._stamp = c.Stamp(reply.session, 0)
+        self._stamp = Stamp(reply.session, 0)
 
     def release(self) -> None:
         """Ends the freeze."""
@@ -91,13 +93,13 @@ class Host:
 class BlindHost(Host):
     """A host for a bridge without SAMPLE, which reads the memory instead."""
 
-    def ask(self, request: c.Request) -> Any:
+    def ask(self, request: Request) -> Any:
         if isinstance(request, c.Sample):
             joints = super().ask(c.ReportErrorsPositionsPowers(JOINTS)).joints
             return c.Snapshot(0, 0, joints)
         return super().ask(request)
 
-    def send(self, request: c.Request) -> int:
+    def send(self, request: Request) -> int:
         return 0 if isinstance(request, c.Sample) else super().send(request)
 
 

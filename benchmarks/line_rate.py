@@ -22,8 +22,10 @@ from daq.driver import Controller
 from daq.driver.line_rate import bound_ms
 from daq.link import Link
 from daq.transport import ByteChannel, Endpoint, open_endpoint
-from firmware_protocol.commands import ReadBlock, ReadStatus, Request, Sample, mask_of
+from firmware_protocol.commands import ReadBlock, ReadStatus, Sample
 from firmware_protocol.framing import FRAME_OVERHEAD
+from firmware_protocol.joints import mask_of
+from firmware_protocol.message import Request
 
 BAUD = 115200
 BITS_A_BYTE = 10

@@ -18,14 +18,32 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from firmware_protocol.codes import PROTOCOL_VERSION, Capability, Refusal, StatusFlag
+from firmware_protocol.commands import (
+    PROTOCOL_VERSION,
+    Capability,
+    ExplainedRefusal,
+    Hello,
+    HelloReply,
+    ReadStatus,
+    Refusal,
+    Release,
+    Released,
+    ReportGains,
+    Sample,
+    SetPointsTaken,
+    Snapshot,
+    Status,
+    StatusFlag,
+    Stop,
+    WideGains,
+    WideReading,
+    WideStopped,
+    WriteSetPoints,
+)
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.joints import joints_of
 from firmware_protocol.message import Reply, Request
-from firmware_protocol.replies import ExplainedRefusal, HelloReply, Released, SetPointsTaken, Snapshot, Status
-from firmware_protocol.requests import Hello, ReadStatus, Release, ReportGains, Sample, Stop, WriteSetPoints
 from firmware_protocol.scale import LineScale
-from firmware_protocol.wide import WideGains, WideReading, WideStopped
 
 AXES, COUNTS, PERIOD_US, P_GAIN = 2, 4096, 1000, 2
 LONGEST = 200
@@ -61,9 +79,7 @@ class LineStageDialect:
     def __init__(self, numbers: Sequence[int]) -> None:
         if tuple(numbers) != (1, 2):
             raise ProtocolError("ids: this stage has two axes, write ids=1,2")
-        self.scale = LineScale(
-            joints=AXES, set_point_units=COUNTS, position_counts=COUNTS, every=20, turn_bytes=90, greeting_bytes=60
-        )
+        self.scale = LineScale(joints=AXES, set_point_units=COUNTS, position_counts=COUNTS, every=20, turn_bytes=90)
         self.damaged, self.complaint = 0, ""
         self._jobs: list[_Job] = []
         self._rest = self._next = b""
@@ -114,10 +130,6 @@ class LineStageDialect:
         """Returns the second step of a release, when the first has been answered."""
         written, self._next = self._next, b""
         return written
-
-    def farewell(self) -> bytes:
-        """Returns nothing: the stage does not react to a silent line, and holds its last goals."""
-        return b""
 
     def reset(self) -> None:
         """Drops requests in progress."""

@@ -8,20 +8,12 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from firmware_protocol.commands import (
-    NO_SESSION,
-    UNSTAMPED,
-    Hello,
-    HelloReply,
-    Reply,
-    Request,
-    Stamp,
-    parse_reply,
-    to_frame,
-)
+from firmware_protocol.commands import NO_SESSION, Hello, HelloReply
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.framing import FrameDecoder, encode_frame
+from firmware_protocol.message import Reply, Request, Stamp
 from firmware_protocol.scale import LineScale
+from firmware_protocol.session import UNSTAMPED, parse_reply, to_frame
 
 IDLE_MARK = b"\0\0\0\0"
 """In lock-step the bridge ends each turn with this mark: it sends nothing more until the next request. Frames never
@@ -58,10 +50,6 @@ class LinkDialect(Protocol):
 
     def answer(self) -> bytes:
         """Returns bytes to write after `feed`: the next step of a request that needs several."""
-        ...
-
-    def farewell(self) -> bytes:
-        """Returns bytes to write before the connection is closed in good order."""
         ...
 
     def reset(self) -> None:
@@ -133,10 +121,6 @@ class FramedDialect:
 
     def answer(self) -> bytes:
         """Returns nothing: every request is one frame."""
-        return b""
-
-    def farewell(self) -> bytes:
-        """Returns nothing: the arm stays at its last set points."""
         return b""
 
     def reset(self) -> None:

@@ -30,7 +30,7 @@ from daq.runner.preparation import Consent
 from daq.traces.reader import read_trace
 from daq.trajectories.presets import preset
 from extras.drivers.lerobot_robot import lerobot_robot
-from firmware_protocol.codes import StatusFlag
+from firmware_protocol.commands import StatusFlag
 from tests.daq.quiet import Quiet
 
 BANDWIDTH = 30.0

@@ -17,8 +17,8 @@ TRAVEL = 1.5
 """Time (s) from posture to posture."""
 
 
-def gain_experiment(joints: tuple[int, ...] = (1, 2, 3), start: dict[int, float] | None = None) -> ExperimentSpec:
-    """Returns the experiment to record for `gains_from_trace`; it ends where it began. `start` in rad.
+def gain_experiment(joints: tuple[int, ...] = (1, 2, 3)) -> ExperimentSpec:
+    """Returns the experiment to record for `gains_from_trace`; it ends where it began.
 
     I and D must be 0 while it runs; P is not changed.
     """
@@ -32,9 +32,7 @@ def gain_experiment(joints: tuple[int, ...] = (1, 2, 3), start: dict[int, float]
         at = posture
     moves += _travel(-at)
     segments = tuple(Segment(move=move) for move in moves)
-    return ExperimentSpec(
-        trajectory=Sequence(segments=segments), joints=joints, start=start or {}, hold=0.5, name="calibrate-gain"
-    )
+    return ExperimentSpec(trajectory=Sequence(segments=segments), joints=joints, hold=0.5, name="calibrate-gain")
 
 
 def _travel(degrees: float) -> list[Simple]:

@@ -3,23 +3,66 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict
 
 from daq.client import stopping
 from daq.client.connection import Connection, Request
 from daq.client.control import HeldControl
-from daq.client.experiments import Experiments, Queue, Schedules, new_key
+from daq.client.experiments import Experiments, Queue, Schedules
 from daq.client.jobs import Jobs, Models
 from daq.client.live import LiveStream, open_stream
-from daq.client.programs import Programs
 from daq.client.traces import Traces
 from daq.contracts.machine import Machine
 from daq.contracts.service.events import ServiceEvent
-from daq.contracts.service.experiments import Experiment
 from daq.contracts.service.live import SampleRate, Topic
 from daq.contracts.service.queue import Control
 from daq.contracts.service.robot import Done, JointGains, ProcessState, ResetRequest, RobotStatus, StopResult
-from daq.contracts.service.teaching import CalibrationRequest, TeachingStatus
+from daq.contracts.service.teaching import ProgramEntry, TeachingStatus
+
+Content = TypeVar("Content", bound=BaseModel)
+
+
+class _Kept(BaseModel):
+    model_config = ConfigDict(extra="ignore")
+
+    entry: ProgramEntry
+    program: dict[str, Any]
+
+
+class Programs:
+    """Lists, reads, stores and deletes programs. Their content is a `daq.teaching.Program`; the caller passes that
+    class."""
+
+    def __init__(self, connection: Connection, robot: str) -> None:
+        self._connection = connection
+        self._path = f"{robot}/programs"
+
+    def list(self) -> tuple[ProgramEntry, ...]:
+        """Returns the programs, most recently changed first."""
+        return self._connection.get(tuple[ProgramEntry, ...], self._path)
+
+    def get(self, kind: type[Content], name: str) -> tuple[Content, ProgramEntry]:
+        """Returns a program, parsed as `kind`, with the revision that a change must state. Raises ServiceError."""
+        found = self._connection.get(_Kept, f"{self._path}/{name}")
+        return kind.model_validate(found.program), found.entry
+
+    def put(self, program: BaseModel, name: str, *, revision: int | None = None) -> ProgramEntry:
+        """Stores a new program as `name`, or changes the existing one of that `revision`.
+
+        If the program contains another name, the stored one is renamed. Raises ServiceError if that revision is not the
+        newest.
+        """
+        query = {} if revision is None else {"revision": revision}
+        request = Request("PUT", f"{self._path}/{name}", program, query=query, repeatable=True)
+        return self._connection.ask(ProgramEntry, request)
+
+    def delete(self, name: str) -> None:
+        """Deletes a program permanently."""
+        self._connection.do(Request("DELETE", f"{self._path}/{name}"))
+
 
 CONNECT_PATIENCE = 60.0
 """Time (s) for a mock with its physics engine to start on a busy computer."""
@@ -106,12 +149,6 @@ class Robot:
     def control(self, *, moves_real_arm: bool = False) -> HeldControl:
         """Returns the control of the robot, for a `with` block; a real arm requires the operator's consent."""
         return HeldControl(self._connection, self._path, moves_real_arm=moves_real_arm)
-
-    def calibrate_gain(self, joints: Sequence[int] = (1, 2, 3)) -> Experiment:
-        """Queues the experiment that shows the actual proportional gains; `traces.gains` then computes them."""
-        path, headers = f"{self._path}/calibrations/gain", {"Idempotency-Key": new_key()}
-        body = CalibrationRequest(joints=tuple(joints))
-        return self._connection.ask(Experiment, Request("POST", path, body, headers=headers, repeatable=True))
 
     def live(self, *topics: Topic, rate: SampleRate | None = None, history: float | None = None) -> LiveStream:
         """Opens a live stream of samples, robot, link, queue, jobs, events and teaching."""

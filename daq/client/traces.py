@@ -10,7 +10,6 @@ from daq.client.connection import PART, Connection, Request
 from daq.client.errors import ServiceError
 from daq.contracts.errors import TraceError
 from daq.contracts.labels import Outcome, Source
-from daq.contracts.service.teaching import MeasuredGain
 from daq.contracts.service.traces import CatalogueEntry, TraceChange, TraceDetails, TraceSignals
 
 LAST = "last"
@@ -160,7 +159,3 @@ class Traces:
     def delete(self, trace: str) -> None:
         """Deletes a trace permanently. Refused while a model or a job refers to it."""
         self._connection.do(Request("DELETE", f"{self._path}/{trace}"))
-
-    def gains(self, trace: str) -> Sequence[MeasuredGain]:
-        """Returns the actual proportional gains, as computed from a trace."""
-        return self._connection.get(tuple[MeasuredGain, ...], f"{self._path}/{trace}/gain")

@@ -5,16 +5,41 @@ from __future__ import annotations
 import math
 import re
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, Field, FiniteFloat, StrictBool, ValidationError, model_validator
+from pydantic import BaseModel, Field, FiniteFloat, GetCoreSchemaHandler, StrictBool, ValidationError, model_validator
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord, UserRecord
-from daq.contracts.in_unit import InUnit
 from firmware_protocol.invalid import first_invalid, invalid_of
+
+BOUNDS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
+"""Pydantic's names of the errors for a number outside its bounds."""
+
+
+@dataclass(frozen=True)
+class InUnit:
+    """Marks a field, after its bounds: `Annotated[float, Field(gt=0), InUnit("s")]`."""
+
+    unit: str
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Adds the unit to errors about the bounds."""
+        return core_schema.no_info_wrap_validator_function(self._told, handler(source))
+
+    def _told(self, value: Any, validate: Callable[[Any], Any]) -> Any:
+        try:
+            return validate(value)
+        except ValidationError as error:
+            first = error.errors()[0]
+            if first["type"] not in BOUNDS:
+                raise
+            raise PydanticCustomError(first["type"], f"{first['msg']} {self.unit}", first.get("ctx")) from None
+
 
 JOINTS = 6
 GAIN_LOCATION_LENGTH = 3

@@ -32,8 +32,7 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 TRACE_FORMAT = 2
-"""Version of a trace's metadata and topics; a reader refuses newer versions. Format 1 had events and joint states in
-JSON."""
+"""Version of a trace's metadata and topics; a reader refuses newer versions."""
 
 BY_JOINT = ("position", "set_point", "error", "drive", "velocity", "power_raw")
 """Signals of a trace with a column for each joint."""

@@ -182,12 +182,12 @@ def _plain_signs(text: str) -> str:
     return text.strip().replace("−", "-")
 
 
-def number_text(number: Mapping[str, Any], *, natural_low: bool = True) -> str:
-    """Returns a number in the short form, without its source. `natural_low`: a lower bound of 0 is left out."""
+def number_text(number: Mapping[str, Any]) -> str:
+    """Returns a number in the short form, without its source and without a lower bound of 0."""
     unit = "" if number["unit"] == "1" else f" {number['unit']}"
     deviation = "" if number.get("deviation") is None else f" ± {_digits(number['deviation'])}"
     low, high = number.get("low"), number.get("high")
-    if natural_low and low == 0.0 and high is None:
+    if low == 0.0 and high is None:
         low = None
     sides = "" if low is None and high is None else f" [{_bound(low)}to{_bound(high, ' ')}]"
     return f"{_digits(number['value'])}{deviation}{unit}{sides}"

@@ -27,14 +27,12 @@ from daq.driver.stop import StopConfirmation
 from daq.link import Link, LinkCounters, LinkError, LinkState, RequestRefusedError, expect
 from daq.transport import TransportError
 from firmware_protocol.commands import (
-    ALL_JOINTS,
     PROTOCOL_VERSION,
     Capability,
     ErrorsPositionsPowers,
     Gains,
     GainsSet,
     GripperSet,
-    JointReading,
     OutputsWritten,
     Process,
     ReadProcess,
@@ -52,9 +50,8 @@ from firmware_protocol.commands import (
     Stop,
     Stopped,
     WriteOutputs,
-    joints_of,
-    mask_of,
 )
+from firmware_protocol.joints import ALL_JOINTS, JointReading, joints_of, mask_of
 from firmware_protocol.memory_map import MemoryMap, default_memory_map
 
 EVERY_JOINT = joints_of(ALL_JOINTS)

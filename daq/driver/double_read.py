@@ -22,8 +22,9 @@ from itertools import pairwise
 
 from daq.driver.clock import Clock
 from daq.link import Link, LinkError, expect
-from firmware_protocol.commands import Block, JointReading, ReadBlock
+from firmware_protocol.commands import Block, ReadBlock
 from firmware_protocol.framing import MAX_PAYLOAD
+from firmware_protocol.joints import JointReading
 from firmware_protocol.memory_map import MemoryMap
 from firmware_protocol.units import ADC_COUNTS, counts_to_posture
 

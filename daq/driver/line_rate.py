@@ -10,8 +10,8 @@ import math
 from dataclasses import dataclass
 
 from firmware_protocol.framing import FRAME_OVERHEAD, MAX_PAYLOAD
+from firmware_protocol.message import STAMP_BYTES
 from firmware_protocol.scale import LineScale
-from firmware_protocol.stamp import STAMP_BYTES
 
 LARGEST_SHARE = 0.8
 """Largest share of the line's capacity for sampling. The rest is for repeats, a stop, the bridge's own time (5 ms) and

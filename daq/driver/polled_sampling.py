@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from daq.driver.errors import HardwareFaultError, NoSampleError
-from daq.driver.sampling import ASKED_AFTER, Deliveries
+from daq.driver.sampling import ASKED_AFTER, Deliveries, TickTime
 from daq.driver.snapshot import BoardSnapshot
-from daq.driver.tick_time import TickTime
-from firmware_protocol.commands import AFTER_NEWEST, Sample, SetPointsTaken, Snapshot, StatusFlag, mask_of
+from firmware_protocol.commands import AFTER_NEWEST, Sample, SetPointsTaken, Snapshot, StatusFlag
+from firmware_protocol.joints import mask_of
 
 MOST_TRIES = 5
 """Requests, at least a tick apart, after which a clock that has not advanced counts as stopped."""

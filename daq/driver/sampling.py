@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Protocol
 
@@ -12,28 +13,62 @@ from daq.driver.errors import ControllerRestartedError, NoSampleError
 from daq.driver.line_rate import LineRate, bytes_of_a_snapshot
 from daq.driver.set_point_watch import SentSetPoints, SetPointWatch
 from daq.driver.snapshot import BoardSnapshot, Consistency
-from daq.driver.tick_time import TickTime
 from daq.link import Link, LinkTimeoutError, RequestRefusedError, expect
 from firmware_protocol.commands import (
     AFTER_NEWEST,
     CompactSnapshot,
     FineSetPoints,
-    JointReading,
-    JointReadings,
     MoveAndSample,
     ReadStatus,
     Refusal,
-    Reply,
-    Request,
     Sample,
     SetPointsTaken,
     Snapshot,
     Status,
     StatusFlag,
     WriteSetPoints,
-    mask_of,
 )
+from firmware_protocol.joints import JointReading, JointReadings, mask_of
+from firmware_protocol.message import Reply, Request
 from firmware_protocol.units import POSTURE_UNITS
+
+WINDOW_TICKS = 500
+"""Ticks (10 s) over which the offset is taken: two quartz clocks that differ by 100 ppm drift apart by 1 ms in that
+time."""
+
+
+class TickTime:
+    """Lower envelope of arrival times: a sample may come late, but never before its tick.
+
+    Over the last WINDOW_TICKS ticks, offset = min(arrival_k − k · period), and tick k was at offset + k · period. The
+    estimate is late by the shortest transit time from board to host (the reply's time on the line), which the host's
+    clock cannot distinguish from a later tick.
+
+    A mock that gets no processor time stops its board's clock, and reports for how long (`waited`). Only a longer delay
+    counts as late. An arm never waits.
+    """
+
+    def __init__(self, period_s: float) -> None:
+        self._period_s = period_s
+        self._lowest: deque[tuple[int, float]] = deque()
+        self._waited = 0.0
+
+    def arrived(self, tick: int, time_s: float, waited: float = 0.0) -> float:
+        """Notes that a sample of `tick` arrived at `time_s`, and returns the estimated time (s) of the tick. `waited`:
+        total time (s) for which the board's clock has stood still before that."""
+        self._waited = waited
+        offset = time_s - waited - tick * self._period_s
+        while self._lowest and self._lowest[-1][1] >= offset:
+            self._lowest.pop()
+        self._lowest.append((tick, offset))
+        while self._lowest[0][0] <= tick - WINDOW_TICKS:
+            self._lowest.popleft()
+        return self.time_of(tick)
+
+    def time_of(self, tick: int) -> float:
+        """Returns the estimated time (s) of a past or future tick. At least one sample must have arrived."""
+        return self._lowest[0][1] + tick * self._period_s + self._waited
+
 
 PHASE_STEP = 0.25
 """Periods by which the readings are delayed after they met the controller's change of the memory."""

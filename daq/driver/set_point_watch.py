@@ -6,7 +6,7 @@ import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from firmware_protocol.commands import JointReading
+from firmware_protocol.joints import JointReading
 
 
 @dataclass(eq=False)

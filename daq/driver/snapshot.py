@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from firmware_protocol.commands import JointReading, StatusFlag
+from firmware_protocol.commands import StatusFlag
+from firmware_protocol.joints import JointReading
 
 Consistency = Literal["sample", "double-read"]
 

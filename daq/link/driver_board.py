@@ -11,12 +11,28 @@ from collections import deque
 from collections.abc import Callable, Sequence
 
 from daq.contracts.robot_driver import DriverError, Positions, RobotDriver
-from firmware_protocol.codes import PROTOCOL_VERSION, Capability, Refusal, StatusFlag
+from firmware_protocol.commands import (
+    PROTOCOL_VERSION,
+    Capability,
+    ExplainedRefusal,
+    Hello,
+    HelloReply,
+    ReadStatus,
+    Refusal,
+    Release,
+    Released,
+    Sample,
+    SetPointsTaken,
+    Snapshot,
+    Status,
+    StatusFlag,
+    Stop,
+    WideReading,
+    WideStopped,
+    WriteSetPoints,
+)
 from firmware_protocol.joints import JointReading, joints_of
 from firmware_protocol.message import Reply, Request
-from firmware_protocol.replies import ExplainedRefusal, HelloReply, Released, SetPointsTaken, Snapshot, Status
-from firmware_protocol.requests import Hello, ReadStatus, Release, Sample, Stop, WriteSetPoints
-from firmware_protocol.wide import WideReading, WideStopped
 
 TICK_S = 0.001
 """Unit (s) of ticks, which count this computer's monotonic time: a driver has no control period."""

@@ -25,8 +25,8 @@ from daq.plugins import named, plugins
 from daq.transport import ChannelError, PortBusyError, TransportError
 from daq.transport.holders import other_holders
 from daq.transport.url import DriverPort, PortUrlError
+from firmware_protocol.commands import Stop
 from firmware_protocol.message import Reply, Request
-from firmware_protocol.requests import Stop
 from firmware_protocol.scale import LineScale
 
 CONNECTED_WITHIN = 60.0
@@ -233,10 +233,6 @@ class DriverLine:
 
     def answer(self) -> bytes:
         """Returns nothing: a request has one step."""
-        return b""
-
-    def farewell(self) -> bytes:
-        """Returns nothing: the robot holds its last set points."""
         return b""
 
     def reset(self) -> None:

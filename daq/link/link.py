@@ -28,12 +28,11 @@ from firmware_protocol.commands import (
     Hello,
     HelloReply,
     Refused,
-    Reply,
-    Request,
     Stop,
     Stopped,
 )
 from firmware_protocol.dialect import FramedDialect, LinkDialect
+from firmware_protocol.message import Reply, Request
 
 R = TypeVar("R", bound=Reply)
 

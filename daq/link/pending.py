@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 
 from daq.link.counters import Tally
 from daq.link.timing import reply_opcode
-from firmware_protocol.commands import NO_SESSION, PROTOCOL_VERSION, Hello, HelloReply, Refused, Reply, Request
+from firmware_protocol.commands import NO_SESSION, PROTOCOL_VERSION, Hello, HelloReply, Refused
+from firmware_protocol.message import Reply, Request
 
 SEQUENCE_NUMBERS = 0x10000
 REMEMBERED = 256

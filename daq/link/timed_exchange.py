@@ -9,7 +9,8 @@ from daq.link.connection import Connection
 from daq.link.errors import LinkError, LinkTimeoutError
 from daq.link.pending import Transaction
 from daq.transport.holders import shared_port_advice
-from firmware_protocol.commands import Request, Stop
+from firmware_protocol.commands import Stop
+from firmware_protocol.message import Request
 
 
 class TimedExchange:

@@ -11,8 +11,9 @@ from daq.link.errors import LinkError, LinkTimeoutError
 from daq.link.pending import Transaction
 from daq.link.timed_exchange import no_reply
 from daq.link.timing import LOCK_STEP_WATCHDOG_S, copies_of
-from firmware_protocol.commands import Advance, Request
+from firmware_protocol.commands import Advance
 from firmware_protocol.dialect import IDLE_MARK
+from firmware_protocol.message import Request
 
 _BETWEEN_ZEROS = re.compile(rb"[^\0]+")
 

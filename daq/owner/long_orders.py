@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, SafetyError
@@ -11,13 +12,13 @@ from daq.contracts.frozen import like
 from daq.contracts.joint_text import speed_unit
 from daq.contracts.limp import limp_line
 from daq.contracts.sample import SampleRow
-from daq.link import LinkState
+from daq.driver import Controller
+from daq.link import LinkError, LinkState
 from daq.owner.guardian import EndCause
-from daq.owner.late_stop import deliver_late_stop
 from daq.owner.messages import Answer, Finished, JogBegin, JogDrive, LeadBegin, QuickOrder, RunExperiment, RunProgram
 from daq.owner.owned_robot import OwnedRobot
 from daq.owner.quick_orders import carry_out
-from daq.runner.arm_control import StoppedError
+from daq.runner.arm_control import StoppedError, stop_line
 from daq.runner.experiment import RunResult, RunSetup, StopRequests, run_experiment
 from daq.runner.preparation import Consent, require_not_stopped
 from daq.teaching.jog import JogCommand, jog, top_speed
@@ -27,6 +28,35 @@ from daq.teaching.program import Program
 from daq.teaching.program_plan import check_program, plan_program, run_program
 from daq.teaching.recording import RecordedPath
 from firmware_protocol.errors import ProtocolError
+
+
+@dataclass(frozen=True)
+class _UntilClosed:
+    """Ends the attempts when the time window closes."""
+
+    closes: float
+    sleep: Callable[[float], None]
+
+    def wait(self, timeout: float) -> bool:
+        """Returns True once the window has closed."""
+        remaining = self.closes - time.monotonic()
+        if remaining <= 0:
+            return True
+        self.sleep(min(timeout, remaining))
+        return False
+
+
+def deliver_late_stop(controller: Controller, window: float, sleep: Callable[[float], None] = time.sleep) -> str:
+    """Tries to reach the controller for `window` s, with doubling delays, and freezes the arm once it answers.
+
+    Returns a line with the result. It sends only the stop, for which the controller needs no greeting.
+    """
+    begun = time.monotonic()
+    try:
+        controller.link.reconnect(_UntilClosed(begun + window, sleep))
+    except LinkError as error:
+        return f"the link did not come back within {window:g} s ({error}): the arm holds its last set point"
+    return f"the link came back after {time.monotonic() - begun:.1f} s: {stop_line(controller.stop())}"
 
 
 def run(robot: OwnedRobot, order: RunExperiment) -> Answer:

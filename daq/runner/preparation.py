@@ -21,7 +21,7 @@ from daq.trajectories.planner import plan, start_angles
 from daq.trajectories.set_points import Plan, control_period
 from firmware_protocol.commands import StatusFlag
 from firmware_protocol.framing import FRAME_OVERHEAD
-from firmware_protocol.stamp import STAMP_BYTES
+from firmware_protocol.message import STAMP_BYTES
 
 LINE_SHARE = 0.6
 """Share of the line's capacity for samples of all joints; if they need more, only the experiment's joints are

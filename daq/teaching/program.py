@@ -12,8 +12,7 @@ from daq.contracts.documents import parse_toml, read_text
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import Angle, Duration, JointNumber
 from daq.contracts.frozen import FrozenRecord
-from daq.teaching.files import write_whole
-from daq.teaching.recording import FASTEST_RATE, SLOWEST_RATE, RecordedPath
+from daq.teaching.recording import FASTEST_RATE, SLOWEST_RATE, RecordedPath, write_whole
 from daq.trajectories.move import MOVE_SPEED
 from firmware_protocol.invalid import first_invalid
 

@@ -11,7 +11,8 @@ from pydantic import Field, FiniteFloat, model_validator
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import JOINTS, ExperimentSpec, JointNumber, Path, Row
 from daq.contracts.frozen import FrozenRecord
-from daq.teaching.files import write_whole
+from daq.contracts.whole_file import replacing
+from daq.traces import disk
 
 SLOWEST_RATE = 0.01
 """Lowest playback rate: one minute of path then takes more than 1.5 hours."""
@@ -85,3 +86,12 @@ def playback(path: RecordedPath, rate: float = 1.0, name: str | None = None) -> 
 def save_path(path: RecordedPath, file: FilePath) -> None:
     """Writes a path as JSON, completely or not at all. Raises a one-line SpecError."""
     write_whole(file, path.model_dump_json(indent=1) + "\n")
+
+
+def write_whole(path: FilePath, text: str) -> None:
+    """Writes a text file and syncs it to the disk. Raises a one-line SpecError; the old file then stays."""
+    try:
+        with replacing(path) as part:
+            part.write_bytes(text.encode())
+    except OSError as error:
+        raise SpecError(f"{path}: cannot be written: {disk.reason(error)}") from error

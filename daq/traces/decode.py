@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import TraceEvent
 from daq.contracts.trace_limits import TraceLimits
-from daq.traces import cdr, layout, set_points_taken
+from daq.traces import cdr, layout
 from daq.traces.scan import TOO_MANY, UNREADABLE, Place, Scan, alike, fills, places, require
 
 Samples = NDArray[Any]
@@ -23,12 +22,7 @@ FEW = 8
 """Fewer chunks of one size are faster read one by one."""
 TOGETHER = 128
 """Chunks that are read at once: they stay in the processor's cache."""
-_JOINT_TOPICS = (layout.JOINT_TOPIC, layout.FORMAT_1_JOINT_TOPIC)
-_EVENT_DECODERS: dict[tuple[str, str], Callable[[bytes], TraceEvent]] = {
-    (layout.EVENT_SCHEMA, "cdr"): cdr.event_of,
-    (layout.FORMAT_1_EVENT_SCHEMA, "json"): layout.event_of_format_1,
-}
-"""Readers of events, by schema and encoding."""
+_SCHEMAS = {layout.EVENTS_TOPIC: layout.EVENT_SCHEMA, layout.SET_POINTS_TOPIC: layout.SET_POINTS_SCHEMA}
 
 
 class _Contents(NamedTuple):
@@ -94,13 +88,9 @@ class _Decoder:
         self._records_left = limits.records - found.records
         self._event_count, self._most_events = 0, limits.events
         channels = _channels(found)
-        self._joints = [
-            channels.get(f"{layout.JOINT_TOPIC}{joint}", channels.get(f"{layout.FORMAT_1_JOINT_TOPIC}{joint}"))
-            for joint in joints
-        ]
+        self._joints = [channels.get(f"{layout.JOINT_TOPIC}{joint}") for joint in joints]
         self._events = channels.get(layout.EVENTS_TOPIC)
-        self._event_of = _event_decoder(found, self._events)
-        self._taken = set_points_taken.channel_in(found)
+        self._taken = channels.get(layout.SET_POINTS_TOPIC)
 
     def joined(self, contents: list[_Contents]) -> Decoded:
         """Returns the samples of successive chunks."""
@@ -108,7 +98,7 @@ class _Decoder:
         samples = (np.frombuffer(b"".join(c.samples[k] for c in contents), layout.JOINT_SAMPLE_DTYPE) for k in joints)
         taken = None
         if self._taken is not None:
-            taken = np.frombuffer(b"".join(c.taken for c in contents), set_points_taken.DTYPE)
+            taken = np.frombuffer(b"".join(c.taken for c in contents), layout.TAKEN_DTYPE)
         return Decoded(tuple(samples), taken, tuple(event for c in contents for event in c.events))
 
     def contents(self, chunks: list[bytes]) -> list[_Contents]:
@@ -162,12 +152,12 @@ class _Decoder:
         samples = tuple(
             _whole(messages.get(channel, []), layout.JOINT_SAMPLE_BYTES, "a sample") for channel in self._joints
         )
-        topic = f"a message of {set_points_taken.TOPIC}"
-        taken = _whole(messages.get(self._taken, []), set_points_taken.DTYPE.itemsize, topic)
+        topic = f"a message of {layout.SET_POINTS_TOPIC}"
+        taken = _whole(messages.get(self._taken, []), layout.TAKEN_DTYPE.itemsize, topic)
         events = [] if self._events is None else messages.get(self._events, [])
         self._event_count += len(events)
         require(self._event_count, self._most_events, "there are more than {} events", "events")
-        return _Contents(samples, taken, tuple(map(self._event_of, events)))
+        return _Contents(samples, taken, tuple(map(cdr.event_of, events)))
 
 
 def _whole(messages: list[bytes], size: int, what: str) -> bytes:
@@ -195,32 +185,16 @@ def _require_same_ticks(samples: tuple[NDArray[Any], ...]) -> None:
 
 
 def _channels(found: Scan) -> dict[str, int]:
-    """Returns the channel of each topic. Raises ValueError if a joint has an unknown schema, or a topic two
+    """Returns the channel of each topic. Raises ValueError if one that is read has another schema, or a topic two
     channels."""
     channels: dict[str, int] = {}
     for channel in found.channels.values():
         schema = found.schemas.get(channel.schema_id)
         name = schema.name if schema else ""
-        if channel.topic.startswith(_JOINT_TOPICS) and (name, channel.message_encoding) != (
-            layout.JOINT_SCHEMA,
-            "cdr",
-        ):
-            raise ValueError(f"topic {channel.topic} has schema {name!r}, expected {layout.JOINT_SCHEMA!r} in CDR")
+        expected = layout.JOINT_SCHEMA if channel.topic.startswith(layout.JOINT_TOPIC) else _SCHEMAS.get(channel.topic)
+        if expected is not None and (name, channel.message_encoding) != (expected, "cdr"):
+            has = f"schema {name!r} in {channel.message_encoding!r}"
+            raise ValueError(f"topic {channel.topic} has {has}, expected {expected!r} in CDR")
         if channels.setdefault(channel.topic, channel.id) != channel.id:
             raise ValueError(f"topic {channel.topic} has two channels")
     return channels
-
-
-def _event_decoder(found: Scan, channel: int | None) -> Callable[[bytes], TraceEvent]:
-    """Returns the decoder of the event channel. Raises ValueError for a channel of other messages."""
-    if channel is None:
-        return cdr.event_of
-    schema = found.schemas.get(found.channels[channel].schema_id)
-    named = schema.name if schema else "", found.channels[channel].message_encoding
-    decoder = _EVENT_DECODERS.get(named)
-    if decoder is None:
-        topic = layout.EVENTS_TOPIC
-        raise ValueError(
-            f"topic {topic} has schema {named[0]!r} in {named[1]!r}, expected {layout.EVENT_SCHEMA!r} in CDR"
-        )
-    return decoder

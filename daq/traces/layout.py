@@ -17,7 +17,6 @@ import numpy as np
 from pydantic_core import from_json
 
 from daq.contracts.sample import SampleRow
-from daq.contracts.trace import TraceEvent
 from daq.traces.cdr import HEADER
 
 SUFFIX = ".mcap"
@@ -35,14 +34,15 @@ JOINT_TOPIC = "/samples/joint_"
 """Prefix of a joint's topic, followed by its number, from 1. In ROS 2, no part of a topic name may begin with a
 digit."""
 
+SET_POINTS_TOPIC = "/set_points"
+"""The control period from which the set points of each sample were used. Only records of slow lines have it: on a fast
+line every period is sampled, and a sample itself shows its set points."""
+
 JOINT_SCHEMA = "ma2000_daq/msg/JointSample"
+SET_POINTS_SCHEMA = "ma2000_daq/msg/SetPointsTaken"
 JOINT_STATES_SCHEMA = "sensor_msgs/msg/JointState"
 EVENT_SCHEMA = "ma2000_daq/msg/Event"
 LOG_SCHEMA = "rcl_interfaces/msg/Log"
-
-FORMAT_1_JOINT_TOPIC = "/joint/"
-FORMAT_1_EVENT_SCHEMA = "foxglove.Log"
-"""The counterpart in traces of format 1, which had other topic names and events in JSON."""
 
 START_METADATA = "daq.record"
 """Metadata record at the start: `record` (TraceRecord as JSON), `joints` and `signals` (separated by spaces)."""
@@ -89,6 +89,11 @@ JOINT_SAMPLE_DTYPE = np.dtype(
     ]
 )
 """schemas/JointSample.msg in CDR: a 4-byte header, then aligned fields without padding."""
+TAKEN = "taken"
+"""Column of a trace with the content of SET_POINTS_TOPIC."""
+_TAKEN = struct.Struct("<4s2q")
+TAKEN_DTYPE = np.dtype([("cdr", "S4"), ("tick", "<i8"), ("taken", "<i8")])
+"""schemas/SetPointsTaken.msg in CDR."""
 
 
 @cache
@@ -120,11 +125,9 @@ def joint_sample(row: SampleRow, column: int) -> bytes:
     )
 
 
-def event_of_format_1(message: bytes) -> TraceEvent:
-    """Decodes the event in a foxglove.Log with additional fields. Raises ValueError for any other text."""
-    fields = json_object(message)
-    own = {key: fields[key] for key in ("time", "message", "tick", "joint") if key in fields}
-    return TraceEvent.model_validate(own | {"kind": fields.get("name")})
+def taken_message(row: SampleRow) -> bytes:
+    """Encodes from which period the set points of a sample were used."""
+    return _TAKEN.pack(HEADER, row.tick, row.taken)
 
 
 def json_object(text: str | bytes) -> dict[str, Any]:

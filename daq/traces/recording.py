@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from importlib.metadata import version
 from typing import IO
 
-from mcap.data_stream import RecordBuilder
-from mcap.records import ChunkIndex
 from mcap.writer import CompressionType, Writer
 
 from daq.contracts.errors import TraceError
@@ -16,53 +13,18 @@ from daq.contracts.labels import Outcome
 from daq.contracts.machine import joint_names
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import TRACE_FORMAT, TraceEvent, TraceRecord
-from daq.traces import cdr, layout, set_points_taken
+from daq.traces import cdr, layout
 from daq.traces.cdr import JointStates
-from daq.traces.scan import Scan
 
 ONE_CHUNK_A_FLUSH = 1 << 40
 """Chunk size (bytes) that is never reached: chunks end only at `flush`, never within a row."""
-PACKED = 1 << 16
-"""Size (bytes) at which records of the index are compressed."""
 
 
-class ChunkIndexes:
-    """What a writer keeps of each chunk until the end, as compressed records; as objects they take 3 MB an hour.
-
-    To the writer it is a list of one index, itself, which writes all of them, once.
-    """
-
-    def __init__(self) -> None:
-        self._records = RecordBuilder()
-        self._packed: list[bytes] = []
-
-    def append(self, index: ChunkIndex) -> None:
-        """Adds the index of one chunk."""
-        index.write(self._records)
-        if self._records.count >= PACKED:
-            self._packed.append(zlib.compress(self._records.end()))  # type: ignore[no-untyped-call]
-
-    def __iter__(self) -> Iterator[ChunkIndexes]:
-        yield self
-
-    def write(self, stream: RecordBuilder) -> None:
-        """Writes all of them, in their order."""
-        for records in self._packed:
-            stream.write(zlib.decompress(records))
-        stream.write(self._records.end())  # type: ignore[no-untyped-call]
-
-
-def open_mcap(stream: IO[bytes], profile: str = layout.PROFILE) -> Writer:
+def open_mcap(stream: IO[bytes]) -> Writer:
     """Opens the MCAP writer of all traces: zstd, one chunk per flush, checksums over chunks and the data section."""
     writer = Writer(stream, chunk_size=ONE_CHUNK_A_FLUSH, compression=CompressionType.ZSTD, enable_data_crcs=True)
-    writer._Writer__chunk_indices = ChunkIndexes()  # type: ignore[attr-defined]  # no public way, so pinned to mcap 1.6
-    writer.start(profile, software())
+    writer.start(layout.PROFILE, software())
     return writer
-
-
-def profile_of(found: Scan) -> str:
-    """Returns the profile for a copy: traces of format 1 have topics in JSON, which ROS 2 lacks."""
-    return layout.PROFILE if all(one.message_encoding == "cdr" for one in found.channels.values()) else ""
 
 
 def outcome_metadata(
@@ -123,8 +85,8 @@ class Recording:
         self._event = self._channel(layout.EVENTS_TOPIC, layout.EVENT_SCHEMA)
         self._log = self._channel(layout.LOG_TOPIC, layout.LOG_SCHEMA)
         self._taken: int | None = None
-        if set_points_taken.SIGNAL in signals:
-            self._taken = self._channel(set_points_taken.TOPIC, set_points_taken.SCHEMA)
+        if layout.TAKEN in signals:
+            self._taken = self._channel(layout.SET_POINTS_TOPIC, layout.SET_POINTS_SCHEMA)
 
     def _channel(self, topic: str, schema: str, joint: str | None = None) -> int:
         """Registers a topic; `joint` is the name of its joint."""
@@ -148,7 +110,7 @@ class Recording:
         for column, channel in enumerate(self._joints):
             self._mcap.add_message(channel, logged, layout.joint_sample(row, column), published, self.samples)
         if self._taken is not None:
-            self._mcap.add_message(self._taken, logged, set_points_taken.message(row), published, self.samples)
+            self._mcap.add_message(self._taken, logged, layout.taken_message(row), published, self.samples)
         self.samples += 1
         self.last_time = row.time
 

@@ -23,7 +23,7 @@ from daq.traces.ends import Texts
 from daq.traces.metadata import NewerTraceError, joints_of, record_of
 from daq.traces.naming import finished_path
 from daq.traces.reader import TOO_LARGE, read_trace, trace_of
-from daq.traces.recording import open_mcap, outcome_metadata, profile_of
+from daq.traces.recording import open_mcap, outcome_metadata
 from daq.traces.scan import Scan, messages, scan
 
 NO_SCHEMA = 0
@@ -143,7 +143,7 @@ def _salvage_locked(part: Path, data: bytes, limits: TraceLimits) -> Salvaged:
     duration = float(trace.time[-1] - trace.time[0]) if len(trace) else 0.0
     try:
         with unfinished.open("wb") as stream:
-            writer = open_mcap(stream, profile_of(found))
+            writer = open_mcap(stream)
             copy_records(found, writer)
             remark = f"salvaged; {dropped} bytes at the end could not be read"
             end = outcome_metadata("interrupted", readable.counters, len(trace), duration, remark)

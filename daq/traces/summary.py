@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from daq.contracts.figures import JointFigureSet
+from daq.contracts.service.traces import JointFigureSet
 from daq.contracts.trace import Floats, Trace
 
 RISE_FROM, RISE_TO = 0.1, 0.9

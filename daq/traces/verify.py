@@ -50,7 +50,7 @@ class Verification(FrozenRecord):
 
 
 def verify(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Verification:
-    """Checks everything that a trace file alone allows; never uses the cache.
+    """Checks everything that a trace file alone allows.
 
     Raises TraceError only if the file cannot be read from the disk, or exceeds the limits or the memory.
     """

@@ -1,10 +1,9 @@
 """Transports bytes to and from a controller: by serial port, pseudo-terminal, TCP, or a mock that it starts itself."""
 
-from daq.transport.channel import ByteChannel, ChannelError
+from daq.transport.channel import ByteChannel, ChannelError, ReconnectDelay
 from daq.transport.discovery import FoundPort, ports
 from daq.transport.endpoint import Endpoint, open_endpoint
 from daq.transport.pseudo_terminal import Terminal, require_same, terminal_at
-from daq.transport.reconnect import ReconnectDelay
 from daq.transport.url import (
     DriverPort,
     MockPort,

@@ -6,7 +6,8 @@ import contextlib
 import os
 import select
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Protocol
 
 from daq.transport.url import TransportError
@@ -120,3 +121,26 @@ class DescriptorChannel:
         outgoing.register(self._descriptor, select.POLLOUT)
         if not outgoing.poll(WRITE_TIMEOUT_S * 1000):
             raise ChannelError(f"{self._description}: takes no more bytes (nothing sent for {WRITE_TIMEOUT_S} s)")
+
+
+# ---- Delays between attempts to reconnect: doubled up to a limit. Pure
+
+
+@dataclass(frozen=True)
+class ReconnectDelay:
+    """Delays (s) before the attempts that follow a lost connection; the first attempt is made at once."""
+
+    first_s: float = 0.1
+    longest_s: float = 5.0
+
+    def __post_init__(self) -> None:
+        if not 0 < self.first_s <= self.longest_s:
+            raise ValueError(f"delays of {self.first_s} to {self.longest_s} s: must be above 0 and ascending")
+
+    def delays(self) -> Iterator[float]:
+        """0, first, 2·first, 4·first … longest, longest, …; without end."""
+        yield 0.0
+        delay = self.first_s
+        while True:
+            yield delay
+            delay = min(2 * delay, self.longest_s)

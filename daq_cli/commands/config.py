@@ -10,6 +10,17 @@ import typer
 from daq.contracts.errors import SpecError
 from daq_cli.app.context import JsonOption, console, invocation, print_json
 
+PLACES = (Path(__file__).parents[2] / "ma2000" / "examples", Path(__file__).parents[2] / "examples")
+"""Folders in an installed package (pyproject.toml) and in the source tree. Beside an installed package, a folder with
+the second name may belong to another project."""
+
+
+def example_files() -> tuple[Path, ...]:
+    """Returns the example files, sorted by name; empty if the installation lacks them."""
+    folder = next((place for place in PLACES if place.is_dir()), None)
+    return tuple(sorted(path for path in folder.iterdir() if path.is_file())) if folder else ()
+
+
 app = typer.Typer(add_completion=False, help="Show and check the configuration.", no_args_is_help=True)
 
 
@@ -73,8 +84,6 @@ def _copy_examples(folder: Path) -> None:
     """Copies the examples into a new folder: all of them, or none and no folder."""
     import shutil
     import tempfile
-
-    from daq.config.examples import example_files
 
     files = example_files()
     if not files:

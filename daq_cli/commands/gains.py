@@ -11,7 +11,7 @@ from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import JsonOption, YesOption, console, print_json
 from daq_cli.app.quantities import parse_gains
 from daq_cli.robot.access import robot_of
-from firmware_protocol.requests import SetGains
+from firmware_protocol.commands import SetGains
 
 app = typer.Typer(add_completion=False, help="Show or set the controller's PID gains.", no_args_is_help=True)
 

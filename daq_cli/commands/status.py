@@ -15,7 +15,7 @@ app = typer.Typer(add_completion=False)
 def status(context: typer.Context, json: JsonOption = False) -> None:
     """Posture, state and link of the robot, read once; --json has the same fields here and at a server."""
     from daq.contracts.joint_text import position_text
-    from daq.runner.line_status import rates_line
+    from daq.owner.seen import rates_line
 
     robot = robot_of(context)
     found = robot.state()

@@ -18,7 +18,7 @@ from daq.contracts.trace_limits import TraceLimits
 from daq.traces import disk, layout
 from daq.traces.cdr import CdrWriter
 from daq.traces.reader import trace_of
-from daq.traces.recording import open_mcap, profile_of
+from daq.traces.recording import open_mcap
 from daq.traces.salvage import copy_records
 from daq.traces.scan import Scan, scan
 
@@ -89,7 +89,7 @@ def _stamped(trace: Trace, pictures: Sequence[Picture]) -> list[tuple[int, bytes
 
 def _write(stream: object, found: Scan, end: dict[str, str], stamped: list[tuple[int, bytes]]) -> None:
     """Copies a trace, with the pictures between its chunks, each where its time is."""
-    writer = open_mcap(stream, profile_of(found))  # type: ignore[arg-type]
+    writer = open_mcap(stream)  # type: ignore[arg-type]
     waiting = list(enumerate(stamped))[::-1]
     channel = writer.register_channel(TOPIC, "cdr", writer.register_schema(SCHEMA, "ros2msg", DEFINITION), {})
 

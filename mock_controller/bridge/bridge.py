@@ -15,14 +15,10 @@ from firmware_protocol.commands import (
     PROTOCOL_VERSION,
     Advance,
     Advanced,
-    AdvanceOrder,
-    Arrival,
     Capability,
-    CompactReading,
     CompactSnapshot,
     Hello,
     HelloReply,
-    JointReading,
     MoveAndSample,
     ReadBlock,
     ReadProcess,
@@ -31,12 +27,9 @@ from firmware_protocol.commands import (
     Refused,
     Release,
     Released,
-    Reply,
     ReportErrorsPositionsPowers,
     ReportGains,
-    Request,
     Sample,
-    Session,
     SetGains,
     SetGripper,
     SetPointsTaken,
@@ -48,14 +41,12 @@ from firmware_protocol.commands import (
     WriteBlock,
     WriteOutputs,
     WriteSetPoints,
-    joints_of,
-    parse_request,
-    refusal_of,
-    stamp_of,
-    to_frame,
 )
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.framing import Frame
+from firmware_protocol.joints import CompactReading, JointReading, joints_of
+from firmware_protocol.message import Reply, Request
+from firmware_protocol.session import AdvanceOrder, Arrival, Session, parse_request, refusal_of, stamp_of, to_frame
 from mock_controller.board.snapshot import RING_DEPTH, PeriodSnapshot
 from mock_controller.bridge.routines import MemoryRoutines
 from mock_controller.bridge.stop_record import StopRecord

@@ -14,20 +14,19 @@ from firmware_protocol.commands import (
     Gains,
     GainsSet,
     GripperSet,
-    JointReading,
     OutputsWritten,
     Process,
     ReadBlock,
-    Reply,
     ReportErrorsPositionsPowers,
     SetGains,
     SetGripper,
     WriteBlock,
     WriteOutputs,
     WriteSetPoints,
-    joints_of,
 )
+from firmware_protocol.joints import JointReading, joints_of
 from firmware_protocol.memory_map import JOINTS
+from firmware_protocol.message import Reply
 from mock_controller.timeline import Timeline
 
 _GAINS = ("gain_p", "gain_i", "gain_d")

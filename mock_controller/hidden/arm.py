@@ -106,11 +106,9 @@ class HiddenArm:
         kept = (effect for index, effect in enumerate(self.effects) if index != leave_out)
         return tuple(modification for effect in kept for modification in effect.modifications())
 
-    def parts(self, plant: PlantParameters, board: BoardParameters, leave_out: int | None = None) -> LoopParts:
+    def parts(self, plant: PlantParameters, board: BoardParameters) -> LoopParts:
         """Returns the complete arm, for a loop without rounding."""
-        return LoopParts(
-            self.plant_parameters(plant), self.board_parameters(board), self.modifications(leave_out), self.seed
-        )
+        return LoopParts(self.plant_parameters(plant), self.board_parameters(board), self.modifications(), self.seed)
 
     def truth(self) -> dict[str, Any]:
         """Returns all secrets, as JSON data."""

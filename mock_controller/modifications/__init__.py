@@ -1,7 +1,7 @@
 """Hidden physical effects: named modifications of the plant and the board, absent by default.
 
-`registry` finds them by name. A new effect is a class in a file here, named in the file's SHARED or OPEN_SET; it acts
-through the extension points of plant and board.
+`registry` finds them by name. A new effect is a class in a file here, declared by `parameter.effect`; it acts through
+the extension points of plant and board.
 """
 
 from mock_controller.modification import Modification

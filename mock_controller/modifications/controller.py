@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from random import Random
-from typing import Any, ClassVar
 
 from mock_controller.board.parameters import BoardParameters
-from mock_controller.modifications.parameter import joint_parameter, parameter
+from mock_controller.modifications.parameter import Effect, effect, joint_parameter, parameter
 from mock_controller.plant.parameters import PlantParameters
 
 
-@dataclass
-class InputDelay:
+@effect("input_delay", "u(t) → u(t − τ)", "computing time, or a buffered output")
+class InputDelay(Effect):
     """The drive reaches `joint`'s motor `delay` later than the controller has computed it.
 
     A delay line in steps; a part of a step is shared between the two neighbours, which keeps the volt-seconds.
     """
 
-    name: ClassVar[str] = "input_delay"
-    line: ClassVar[str] = "u(t) → u(t − τ)"
-    source: ClassVar[str] = "computing time, or a buffered output"
     joint: int = joint_parameter()
     delay: float = parameter(0.0, 0.2, unit="s", null=0.0)
 
@@ -41,13 +37,10 @@ class InputDelay:
         return later + self._part * (earlier - later)
 
 
-@dataclass
-class WrongGain:
+@effect("wrong_gain", "power → limit(f · PID)", "section 6.4: adjustable gains are not the physical ones")
+class WrongGain(Effect):
     """`joint`'s controller gives `factor` times the power of its gains, before the limit of the DAC."""
 
-    name: ClassVar[str] = "wrong_gain"
-    line: ClassVar[str] = "power → limit(f · PID)"
-    source: ClassVar[str] = "section 6.4: adjustable gains are not the physical ones"
     joint: int = joint_parameter()
     factor: float = parameter(0.0, 5.0, null=1.0)
 
@@ -57,16 +50,17 @@ class WrongGain:
         return replace(parameters, controller_scales=tuple(scales))
 
 
-@dataclass
-class LostSetPoints:
+@effect(
+    "lost_set_points",
+    "set point of the previous period, in a share of periods",
+    "section 6.3: the controller does not wait",
+)
+class LostSetPoints(Effect):
     """In a `share` of all periods `joint`'s controller keeps its previous set point. `seed` draws the periods.
 
     Effects with one seed lose the same periods, as when a whole fetch is missed.
     """
 
-    name: ClassVar[str] = "lost_set_points"
-    line: ClassVar[str] = "set point of the previous period, in a share of periods"
-    source: ClassVar[str] = "section 6.3: the controller does not wait"
     joint: int = joint_parameter()
     share: float = parameter(0.0, 0.99, null=0.0)
     seed: int = parameter(0, 2**63, default=0)
@@ -83,6 +77,3 @@ class LostSetPoints:
         if self._taken is None or not lost:
             self._taken = counts
         return self._taken
-
-
-SHARED: tuple[type[Any], ...] = (InputDelay, WrongGain, LostSetPoints)

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import cos, sin
-from typing import Any, ClassVar
 
-from mock_controller.modifications.parameter import change_body, joint_parameter, parameter
+from mock_controller.modifications.parameter import Effect, change_body, effect, joint_parameter, parameter
 from mock_controller.plant.parameters import PlantParameters
 
 
-@dataclass
-class Payload:
+@effect("payload", "MLOAD → MLOAD + m, centre moved to the common one", "rigid body")
+class Payload(Effect):
     """Adds `mass` to MLOAD, its centre `offset` beyond the wrist along the hand."""
 
-    name: ClassVar[str] = "payload"
-    line: ClassVar[str] = "MLOAD → MLOAD + m, centre moved to the common one"
-    source: ClassVar[str] = "rigid body"
     mass: float = parameter(-1.0, 5.0, unit="kg", null=0.0)
     offset: float = parameter(-0.5, 0.5, default=0.0, unit="m")
 
@@ -27,13 +23,10 @@ class Payload:
         return change_body(parameters, m_load=m_load, load_offset=moment / m_load)
 
 
-@dataclass
-class LinkMass:
+@effect("link_mass", "m_i → m_i + Δm", "rigid body")
+class LinkMass(Effect):
     """Link `joint` is heavier by `mass`, distributed like its own mass."""
 
-    name: ClassVar[str] = "link_mass"
-    line: ClassVar[str] = "m_i → m_i + Δm"
-    source: ClassVar[str] = "rigid body"
     joint: int = joint_parameter(3)
     mass: float = parameter(-0.25, 5.0, unit="kg", null=0.0)
 
@@ -42,13 +35,10 @@ class LinkMass:
         return change_body(parameters, **{key: getattr(parameters.rigid_body, key) + self.mass})
 
 
-@dataclass
-class CentreOfMass:
+@effect("centre_of_mass", "a/2 → a/2 + s, inertia about the centre unchanged", "rigid body, parallel axes")
+class CentreOfMass(Effect):
     """The centre of mass of link `joint` (2 or 3) lies `shift` further out along the link."""
 
-    name: ClassVar[str] = "centre_of_mass"
-    line: ClassVar[str] = "a/2 → a/2 + s, inertia about the centre unchanged"
-    source: ClassVar[str] = "rigid body, parallel axes"
     joint: int = joint_parameter(3, low=2)
     shift: float = parameter(-0.3, 0.3, unit="m", null=0.0)
 
@@ -57,13 +47,10 @@ class CentreOfMass:
         return change_body(parameters, **{key: getattr(parameters.rigid_body, key) + self.shift})
 
 
-@dataclass
-class BaseTilt:
+@effect("base_tilt", "g → R_y R_x g", "rotation of the base frame")
+class BaseTilt(Effect):
     """The base is tilted: gravity is turned by `about_x`, then by `about_y`, of the base's axes."""
 
-    name: ClassVar[str] = "base_tilt"
-    line: ClassVar[str] = "g → R_y R_x g"
-    source: ClassVar[str] = "rotation of the base frame"
     about_x: float = parameter(-0.5, 0.5, default=0.0, unit="rad", null=0.0)
     about_y: float = parameter(-0.5, 0.5, default=0.0, unit="rad", null=0.0)
 
@@ -75,13 +62,10 @@ class BaseTilt:
         return replace(parameters, rigid_body=replace(parameters.rigid_body, gravity=(x, y, z)))
 
 
-@dataclass
-class SpringTorque:
+@effect("spring_torque", "torque = −k (q − q₀)", "linear spring")
+class SpringTorque(Effect):
     """A spring or cable of `stiffness` pulls `joint` towards `neutral`."""
 
-    name: ClassVar[str] = "spring_torque"
-    line: ClassVar[str] = "torque = −k (q − q₀)"
-    source: ClassVar[str] = "linear spring"
     joint: int = joint_parameter()
     stiffness: float = parameter(0.0, 200.0, unit="N·m/rad", null=0.0)
     neutral: float = parameter(-6.3, 6.3, default=0.0, unit="rad")
@@ -90,13 +74,14 @@ class SpringTorque:
         return -self.stiffness * (angle - self.neutral)
 
 
-@dataclass
-class OneSidedSpring:
+@effect(
+    "one_sided_spring",
+    "torque = −|k| (q − q₀) on the side of q₀ that k's sign says, else 0",
+    "a cable that hangs slack on one side",
+)
+class OneSidedSpring(Effect):
     """A cable of |`stiffness`| pulls `joint` back to `slack` from beyond it, or, if negative, from before it."""
 
-    name: ClassVar[str] = "one_sided_spring"
-    line: ClassVar[str] = "torque = −|k| (q − q₀) on the side of q₀ that k's sign says, else 0"
-    source: ClassVar[str] = "a cable that hangs slack on one side"
     joint: int = joint_parameter()
     stiffness: float = parameter(-200.0, 200.0, unit="N·m/rad", null=0.0)
     slack: float = parameter(-6.3, 6.3, default=0.0, unit="rad")
@@ -108,13 +93,10 @@ class OneSidedSpring:
         return self.stiffness * min(beyond, 0.0)
 
 
-@dataclass
-class ConstantTorque:
+@effect("constant_torque", "torque + T", "a preload")
+class ConstantTorque(Effect):
     """A preload turns `joint` with `torque`, at any angle."""
 
-    name: ClassVar[str] = "constant_torque"
-    line: ClassVar[str] = "torque + T"
-    source: ClassVar[str] = "a preload"
     joint: int = joint_parameter()
     torque: float = parameter(-200.0, 200.0, unit="N·m", null=0.0)
 
@@ -122,13 +104,10 @@ class ConstantTorque:
         return self.torque
 
 
-@dataclass
-class PeriodicDisturbance:
+@effect("periodic_disturbance", "torque + A sin(2π f t + φ)", "an unbalanced machine on the same bench")
+class PeriodicDisturbance(Effect):
     """Something outside pushes `joint` with `amplitude` at `frequency`, whatever the arm does."""
 
-    name: ClassVar[str] = "periodic_disturbance"
-    line: ClassVar[str] = "torque + A sin(2π f t + φ)"
-    source: ClassVar[str] = "an unbalanced machine on the same bench"
     joint: int = joint_parameter()
     amplitude: float = parameter(0.0, 50.0, unit="N·m", null=0.0)
     frequency: float = parameter(0.05, 20.0, default=2.0, unit="Hz")
@@ -136,15 +115,3 @@ class PeriodicDisturbance:
 
     def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the protocol's signature)
         return self.amplitude * sin(6.283185307179586 * self.frequency * time_s + self.phase)
-
-
-SHARED: tuple[type[Any], ...] = (
-    Payload,
-    LinkMass,
-    CentreOfMass,
-    BaseTilt,
-    SpringTorque,
-    OneSidedSpring,
-    ConstantTorque,
-    PeriodicDisturbance,
-)

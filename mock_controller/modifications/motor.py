@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import exp
-from typing import Any, ClassVar
 
-from mock_controller.modifications.parameter import change_joint, joint_parameter, parameter
+from mock_controller.modifications.parameter import Effect, change_joint, effect, joint_parameter, parameter
 from mock_controller.plant.parameters import PlantParameters
 
 _COPPER_PER_KELVIN = 0.0039
 """Temperature coefficient of copper's resistance at 20 °C (1/K)."""
 
 
-@dataclass
-class WeakenedMagnet:
+@effect(
+    "weakened_magnet",
+    "Φ → (1 − f) Φ: K_T and K_b are both in proportion to Φ",
+    "demagnetisation by heat or by a stalled motor's current; data sheets of DC motors",
+)
+class WeakenedMagnet(Effect):
     """The magnet of `joint`'s motor has lost a share of its flux: less torque per ampere, and less back-EMF per
     turn."""
 
-    name: ClassVar[str] = "weakened_magnet"
-    line: ClassVar[str] = "Φ → (1 − f) Φ: K_T and K_b are both in proportion to Φ"
-    source: ClassVar[str] = "demagnetisation by heat or by a stalled motor's current; data sheets of DC motors"
     joint: int = joint_parameter()
     loss: float = parameter(0.0, 0.9, null=0.0)
 
@@ -34,13 +33,12 @@ class WeakenedMagnet:
         )
 
 
-@dataclass
-class MotorInductance:
+@effect(
+    "motor_inductance", "L di/dt = u − R i − K_b ω, advanced by its exact exponential", "third-order motor, chapter 3"
+)
+class MotorInductance(Effect):
     """The winding of `joint`'s motor has `inductance`: the current follows the voltage with L/R."""
 
-    name: ClassVar[str] = "motor_inductance"
-    line: ClassVar[str] = "L di/dt = u − R i − K_b ω, advanced by its exact exponential"
-    source: ClassVar[str] = "third-order motor, chapter 3"
     joint: int = joint_parameter()
     inductance: float = parameter(0.0, 1.0, unit="H", null=0.0)
 
@@ -49,17 +47,18 @@ class MotorInductance:
         return change_joint(parameters, self.joint, inductance=present + self.inductance)
 
 
-@dataclass
-class ResistanceDrift:
+@effect(
+    "resistance_drift",
+    "τ dT/dt = θ R i² − T, R = R₀ (1 + α T)",
+    "first-order thermal model of motor data sheets; α of copper",
+)
+class ResistanceDrift(Effect):
     """The winding of `joint`'s motor warms by its own loss, and its resistance rises.
 
     One thermal mass: τ dΔT/dt = θ R i² − ΔT, R = R₀ (1 + α ΔT), with copper's α. The current that the cold winding
     would carry is reduced by R₀/R; what falls with it is the torque.
     """
 
-    name: ClassVar[str] = "resistance_drift"
-    line: ClassVar[str] = "τ dT/dt = θ R i² − T, R = R₀ (1 + α T)"
-    source: ClassVar[str] = "first-order thermal model of motor data sheets; α of copper"
     joint: int = joint_parameter()
     thermal_resistance: float = parameter(0.0, 1e4, unit="K/W", null=0.0)
     time_constant: float = parameter(0.1, 1e4, default=20.0, unit="s")
@@ -89,17 +88,18 @@ class ResistanceDrift:
         return -self._torque_per_ampere * cold_current * (1.0 - self._cold / resistance)
 
 
-@dataclass
-class ResistanceRise:
+@effect(
+    "resistance_rise",
+    "R = R₀ (1 + r (1 − exp(−t/τ))), whatever the current",
+    "a housing that a neighbour warms, of one thermal mass",
+)
+class ResistanceRise(Effect):
     """The winding of `joint`'s motor is warmed from outside: its resistance finally rises by a share `rise`.
 
     The warming begins with the simulation: R = R₀ (1 + r (1 − exp(−t/τ))). The current that the cold winding would
     carry is divided by R/R₀, and the torque falls with it; the drive's own current has no influence.
     """
 
-    name: ClassVar[str] = "resistance_rise"
-    line: ClassVar[str] = "R = R₀ (1 + r (1 − exp(−t/τ))), whatever the current"
-    source: ClassVar[str] = "a housing that a neighbour warms, of one thermal mass"
     joint: int = joint_parameter()
     rise: float = parameter(-0.5, 2.0, null=0.0)
     time_constant: float = parameter(0.1, 1e4, default=40.0, unit="s")
@@ -111,6 +111,3 @@ class ResistanceRise:
     def torque_change(self, torque: float, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002
         times_colder = 1.0 / (1.0 + self.rise * (1.0 - exp(-time_s / self.time_constant)))
         return (torque + self._damping * rate) * (times_colder - 1.0)
-
-
-SHARED: tuple[type[Any], ...] = (WeakenedMagnet, ResistanceDrift, ResistanceRise, MotorInductance)

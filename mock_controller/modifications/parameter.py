@@ -1,10 +1,11 @@
-"""Declares parameters of a modification class: dataclass fields with unit, bounds and null value."""
+"""Declares modification classes: name, physics and source, and parameters with unit, bounds and null value."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar, TypeVar, dataclass_transform
 
 from mock_controller.plant.parameters import PlantParameters
 
@@ -22,6 +23,33 @@ def parameter(
 def joint_parameter(high: int = 6, low: int = 1) -> Any:
     """Returns the field for the joint (or the link of that number) on which an effect acts."""
     return parameter(low, high)
+
+
+class Effect:
+    """Base of the modifications. `shared`: whether those who diagnose know its name too."""
+
+    name: ClassVar[str]
+    line: ClassVar[str]
+    source: ClassVar[str]
+    shared: ClassVar[bool]
+
+
+Kind = TypeVar("Kind", bound=Effect)
+LIBRARY: dict[str, type[Any]] = {}
+"""Every modification class whose file is loaded, by its name."""
+
+
+@dataclass_transform(field_specifiers=(parameter, joint_parameter))
+def effect(name: str, line: str, source: str, *, shared: bool = True) -> Callable[[type[Kind]], type[Kind]]:
+    """Makes a class a modification: a dataclass whose fields are its parameters, with one `line` of physics and its
+    `source`."""
+
+    def made(kind: type[Kind]) -> type[Kind]:
+        kind.name, kind.line, kind.source, kind.shared = name, line, source, shared
+        LIBRARY[name] = found = dataclasses.dataclass(kind)
+        return found
+
+    return made
 
 
 def fields_of(kind: type[Any]) -> dict[str, dataclasses.Field[Any]]:

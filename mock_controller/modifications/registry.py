@@ -1,7 +1,6 @@
 """Finds modifications by name, and checks their parameters.
 
-A modification class is a dataclass; its fields are its parameters. It also states its `name`, one `line` of physics,
-and its `source`.
+The imports of the files below register their classes.
 """
 
 from __future__ import annotations
@@ -9,36 +8,25 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterable, Mapping
-from functools import cache
 from typing import Any
 
 from mock_controller.modification import Modification
-from mock_controller.modifications import (
-    amplifier,
-    controller,
-    friction,
-    load,
-    motor,
-    sensor,
-    strange_friction,
-    transmission,
-)
-from mock_controller.modifications.parameter import fields_of
+from mock_controller.modifications import amplifier, controller, friction, load, motor, sensor, transmission  # noqa: F401
+from mock_controller.modifications.parameter import LIBRARY, fields_of
 
 
 class ModificationError(ValueError):
     """A modification that does not exist, or an invalid parameter."""
 
 
-@cache
 def known_modifications() -> Mapping[str, type[Any]]:
     """Returns every modification class of the library by its name."""
-    return {kind.name: kind for kind in LIBRARY}
+    return LIBRARY
 
 
 def is_shared(name: str) -> bool:
     """Whether those who diagnose know this name too."""
-    return known_modifications()[name] in SHARED
+    return bool(LIBRARY[name].shared)
 
 
 def build_modification(name: str, values: Mapping[str, object]) -> Modification:
@@ -94,28 +82,3 @@ def _check(name: str, field: dataclasses.Field[Any], value: object) -> None:
     high = field.metadata.get("high", math.inf)
     if not low <= value <= high:
         raise ModificationError(f"modification {name}: {field.name} is {value}, allowed are {low} to {high}")
-
-
-# --- All modifications, collected from the files of this folder
-
-
-SHARED: tuple[type[Any], ...] = (
-    *friction.SHARED,
-    *motor.SHARED,
-    *amplifier.SHARED,
-    *transmission.SHARED,
-    *load.SHARED,
-    *sensor.SHARED,
-    *controller.SHARED,
-)
-"""Effects whose names the diagnosis also uses."""
-
-OPEN_SET: tuple[type[Any], ...] = (
-    *strange_friction.OPEN_SET,
-    *transmission.OPEN_SET,
-    *amplifier.OPEN_SET,
-    *sensor.OPEN_SET,
-)
-"""Effects that only the mock has; to the diagnosis they are unknown."""
-
-LIBRARY: tuple[type[Any], ...] = SHARED + OPEN_SET

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import exp, floor
-from typing import Any, ClassVar
 
 from mock_controller.board.parameters import BoardParameters
-from mock_controller.modifications.parameter import joint_parameter, parameter
+from mock_controller.modifications.parameter import Effect, effect, joint_parameter, parameter
 
 
-@dataclass
-class PotentiometerGain:
+@effect("potentiometer_gain", "shown = mid + (1 + e)(q − mid)", "reference voltage, trimmed at posture 500")
+class PotentiometerGain(Effect):
     """`joint`'s reading is too large by the share `error` of its distance from the middle of the range."""
 
-    name: ClassVar[str] = "potentiometer_gain"
-    line: ClassVar[str] = "shown = mid + (1 + e)(q − mid)"
-    source: ClassVar[str] = "reference voltage, trimmed at posture 500"
     joint: int = joint_parameter()
     error: float = parameter(-0.5, 0.5, null=0.0)
 
@@ -28,13 +23,10 @@ class PotentiometerGain:
         return angle + self.error * (angle - self._middle)
 
 
-@dataclass
-class PotentiometerOffset:
+@effect("potentiometer_offset", "shown = q + o", "wiper turned on its shaft")
+class PotentiometerOffset(Effect):
     """`joint`'s reading is too large by `angle`."""
 
-    name: ClassVar[str] = "potentiometer_offset"
-    line: ClassVar[str] = "shown = q + o"
-    source: ClassVar[str] = "wiper turned on its shaft"
     joint: int = joint_parameter()
     angle: float = parameter(-1.0, 1.0, unit="rad", null=0.0)
 
@@ -42,17 +34,18 @@ class PotentiometerOffset:
         return angle + self.angle
 
 
-@dataclass
-class PotentiometerNonlinearity:
+@effect(
+    "potentiometer_nonlinearity",
+    "shown x/(1 + k x(1 − x)); fed from the other end where k < 0",
+    "voltage divider with a loaded wiper",
+)
+class PotentiometerNonlinearity(Effect):
     """`joint`'s reading bends like that of a potentiometer with a loaded wiper.
 
     With x the wiper's position (0 to 1) and k the potentiometer's resistance over the load's, it shows x/(1 + k x (1 −
     x)). A negative k is the same circuit fed from the other end.
     """
 
-    name: ClassVar[str] = "potentiometer_nonlinearity"
-    line: ClassVar[str] = "shown x/(1 + k x(1 − x)); fed from the other end where k < 0"
-    source: ClassVar[str] = "voltage divider with a loaded wiper"
     joint: int = joint_parameter()
     loading: float = parameter(-1.0, 1.0, unit="1", null=0.0)
 
@@ -67,13 +60,15 @@ class PotentiometerNonlinearity:
         return angle - self._span * bend
 
 
-@dataclass
-class PotentiometerZeroDrift:
+@effect(
+    "potentiometer_zero_drift",
+    "shown = q + d (1 − exp(−t/τ))",
+    "warming of the electronics after power-up",
+    shared=False,
+)
+class PotentiometerZeroDrift(Effect):
     """`joint`'s reading drifts by `drift` as the track warms, with `time_constant`, from power-up on."""
 
-    name: ClassVar[str] = "potentiometer_zero_drift"
-    line: ClassVar[str] = "shown = q + d (1 − exp(−t/τ))"
-    source: ClassVar[str] = "warming of the electronics after power-up"
     joint: int = joint_parameter()
     drift: float = parameter(-0.5, 0.5, unit="rad", null=0.0)
     time_constant: float = parameter(0.1, 1e4, default=20.0, unit="s")
@@ -91,13 +86,15 @@ class PotentiometerZeroDrift:
         return shown
 
 
-@dataclass
-class ConverterBitWeight:
+@effect(
+    "converter_bit_weight",
+    "reading + ε where bit b is set",
+    "integral nonlinearity of a successive-approximation converter",
+    shared=False,
+)
+class ConverterBitWeight(Effect):
     """Bit `bit` of `joint`'s converter weighs `error` counts too much: the reading jumps at its edges."""
 
-    name: ClassVar[str] = "converter_bit_weight"
-    line: ClassVar[str] = "reading + ε where bit b is set"
-    source: ClassVar[str] = "integral nonlinearity of a successive-approximation converter"
     joint: int = joint_parameter()
     error: float = parameter(-200.0, 200.0, unit="count", null=0.0)
     bit: int = parameter(0, 11, default=8)
@@ -106,13 +103,10 @@ class ConverterBitWeight:
         return counts + self.error if floor(counts + 0.5) & (1 << self.bit) else counts
 
 
-@dataclass
-class StuckConverterBit:
+@effect("stuck_converter_bit", "bit b of the reading is stuck", "a broken output latch", shared=False)
+class StuckConverterBit(Effect):
     """Bit `bit` of `joint`'s converter always reads 0 (`level` 0) or 1 (`level` 1). It has no size."""
 
-    name: ClassVar[str] = "stuck_converter_bit"
-    line: ClassVar[str] = "bit b of the reading is stuck"
-    source: ClassVar[str] = "a broken output latch"
     joint: int = joint_parameter()
     bit: int = parameter(-1, 11, null=-1)
     level: int = parameter(0, 1, default=1)
@@ -122,7 +116,3 @@ class StuckConverterBit:
         mask = 1 << self.bit
         stuck = whole | mask if self.level else whole & ~mask
         return counts + (stuck - whole)
-
-
-SHARED: tuple[type[Any], ...] = (PotentiometerGain, PotentiometerOffset, PotentiometerNonlinearity)
-OPEN_SET: tuple[type[Any], ...] = (PotentiometerZeroDrift, ConverterBitWeight, StuckConverterBit)

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import sin
-from typing import Any, ClassVar
 
 from mock_controller.modifications.friction import Bristle
-from mock_controller.modifications.parameter import joint_parameter, parameter
+from mock_controller.modifications.parameter import Effect, effect, joint_parameter, parameter
 from mock_controller.plant.drive_train import Transmission
 from mock_controller.plant.parameters import PlantParameters
 
 
-@dataclass
-class Backlash:
+@effect(
+    "backlash",
+    "rotor and link apart; torque only beyond ± half the play, and teeth only push",
+    "dead-band spring with contact damping (Nordin and Gutman 2002, Automatica 38)",
+)
+class Backlash(Effect):
     """`joint`'s gear has free `play` (full width) between teeth of `stiffness` and `damping`."""
 
-    name: ClassVar[str] = "backlash"
-    line: ClassVar[str] = "rotor and link apart; torque only beyond ± half the play, and teeth only push"
-    source: ClassVar[str] = "dead-band spring with contact damping (Nordin and Gutman 2002, Automatica 38)"
     joint: int = joint_parameter()
     play: float = parameter(0.0, 0.2, unit="rad", null=0.0)
     stiffness: float = parameter(1.0, 1e6, default=5000.0, unit="N·m/rad")
@@ -28,13 +27,14 @@ class Backlash:
         return Transmission(self.stiffness, self.damping, self.play)
 
 
-@dataclass
-class JointCompliance:
+@effect(
+    "joint_compliance",
+    "torque = (θ_rotor − θ_link)/κ + d (rates)",
+    "elastic joint, Spong (1987), J. Dyn. Sys. Meas. Control 109",
+)
+class JointCompliance(Effect):
     """A spring of 1/`compliance` between `joint`'s rotor and link, with `damping`."""
 
-    name: ClassVar[str] = "joint_compliance"
-    line: ClassVar[str] = "torque = (θ_rotor − θ_link)/κ + d (rates)"
-    source: ClassVar[str] = "elastic joint, Spong (1987), J. Dyn. Sys. Meas. Control 109"
     joint: int = joint_parameter()
     compliance: float = parameter(0.0, 0.1, unit="rad/(N·m)", null=0.0)
     damping: float = parameter(0.0, 1e3, default=1.0, unit="N·m·s/rad")
@@ -43,13 +43,14 @@ class JointCompliance:
         return Transmission(1.0 / self.compliance, self.damping, 0.0)
 
 
-@dataclass
-class TorqueRipple:
+@effect(
+    "torque_ripple",
+    "torque + A sin(N q + φ)",
+    "meshing error of the last gear stages (6 to 12 pinion turns per joint turn)",
+)
+class TorqueRipple(Effect):
     """At `joint` a torque of `amplitude`, `periods` times per joint turn."""
 
-    name: ClassVar[str] = "torque_ripple"
-    line: ClassVar[str] = "torque + A sin(N q + φ)"
-    source: ClassVar[str] = "meshing error of the last gear stages (6 to 12 pinion turns per joint turn)"
     joint: int = joint_parameter()
     amplitude: float = parameter(0.0, 50.0, unit="N·m", null=0.0)
     periods: float = parameter(1.0, 400.0, default=12.0, unit="1/turn")
@@ -59,13 +60,12 @@ class TorqueRipple:
         return self.amplitude * sin(self.periods * angle + self.phase)
 
 
-@dataclass
-class DetentCogging:
+@effect(
+    "detent_cogging", "torque + A Σ_{k=1..4} sin(k N q)/√k / 1.6", "slot harmonics of a cogging torque", shared=False
+)
+class DetentCogging(Effect):
     """At `joint` a torque locked to the pinion, sharp like a detent: four harmonics of `periods` per joint turn."""
 
-    name: ClassVar[str] = "detent_cogging"
-    line: ClassVar[str] = "torque + A Σ_{k=1..4} sin(k N q)/√k / 1.6"
-    source: ClassVar[str] = "slot harmonics of a cogging torque"
     joint: int = joint_parameter()
     amplitude: float = parameter(0.0, 50.0, unit="N·m", null=0.0)
     periods: float = parameter(1.0, 100.0, default=10.0, unit="1/turn")
@@ -75,16 +75,13 @@ class DetentCogging:
         return self.amplitude / 1.6 * sum(sin(k * turn) / k**0.5 for k in (1, 2, 3, 4))
 
 
-@dataclass
-class GearLoss:
+@effect("gear_loss", "level + η |torque through the gear|", "tooth friction in proportion to tooth load")
+class GearLoss(Effect):
     """`joint`'s gear loses a share `loss` of the torque that it transmits, in either direction of power.
 
     The loss is friction between teeth, so the arm's own bristle carries it, and it opposes the motion.
     """
 
-    name: ClassVar[str] = "gear_loss"
-    line: ClassVar[str] = "level + η |torque through the gear|"
-    source: ClassVar[str] = "tooth friction in proportion to tooth load"
     joint: int = joint_parameter()
     loss: float = parameter(0.0, 0.95, null=0.0)
 
@@ -102,17 +99,18 @@ class GearLoss:
         return level + self.loss * abs(self._through)
 
 
-@dataclass
-class DirectionDependentGearLoss:
+@effect(
+    "direction_dependent_gear_loss",
+    "|Δ| |torque through the gear| against the motion, only where power flows as Δ's sign says",
+    "load-dependent friction of four quadrants, Hamon, Gautier and Garrec (2010), IROS",
+)
+class DirectionDependentGearLoss(Effect):
     """`joint`'s gear loses a share |`difference`| only while its motor drives, or, if negative, only while driven.
 
     The case depends on the torque through the gear and on the direction in which its teeth slide; a bristle of its own
     keeps that direction at rest.
     """
 
-    name: ClassVar[str] = "direction_dependent_gear_loss"
-    line: ClassVar[str] = "|Δ| |torque through the gear| against the motion, only where power flows as Δ's sign says"
-    source: ClassVar[str] = "load-dependent friction of four quadrants, Hamon, Gautier and Garrec (2010), IROS"
     joint: int = joint_parameter()
     difference: float = parameter(-0.95, 0.95, null=0.0)
 
@@ -132,7 +130,3 @@ class DirectionDependentGearLoss:
         bent = self._bristle.advance(rate)
         flows = self._through * bent * self.difference > 0.0
         return -abs(self.difference * self._through) * bent if flows else 0.0
-
-
-SHARED: tuple[type[Any], ...] = (TorqueRipple, GearLoss, DirectionDependentGearLoss, Backlash, JointCompliance)
-OPEN_SET: tuple[type[Any], ...] = (DetentCogging,)

@@ -31,6 +31,7 @@ async def live(socket: WebSocket, robot: str) -> None:
 @router.get("/robots/{robot}/live/frame", responses=PROBLEMS)
 def get_live_frame(rig: RobotDep, _: Viewer, history: float = 10.0) -> LiveFrame:
     """Returns what the WebSocket would send to a client that joins now."""
+    # the page's types of a frame come from this route's description; OpenAPI has none for a WebSocket
     clock = rig.robot.clock
     now = clock.monotonic()
     return LiveFrame(

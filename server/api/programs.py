@@ -6,9 +6,9 @@ from typing import Annotated
 
 from fastapi import Path, Query, Response
 
-from daq.contracts.service.teaching import ProgramEntry, TeachingStatus
+from daq.contracts.service.teaching import ProgramEntry
 from daq.teaching.program import NAME, Program
-from server.api.dependencies import Arrived, LeaseHeader, Operator, Programs, RobotDep, Viewer
+from server.api.dependencies import Operator, Programs, RobotDep, Viewer
 from server.problems import PROBLEMS
 from server.routes import Router
 from server.store.programs import StoredProgram
@@ -56,18 +56,3 @@ def delete_program(program: ProgramName, rig: RobotDep, programs: Programs, call
     programs.remove(rig.robot.name, program)
     rig.record_event("teaching", f"program {program} was deleted", actor=caller.name)
     return Response(status_code=204)
-
-
-@router.post("/{program}/run", status_code=202)
-def run_stored_program(
-    program: ProgramName,
-    rig: RobotDep,
-    programs: Programs,
-    _: Operator,
-    arrived: Arrived,
-    lease: LeaseHeader = None,
-) -> TeachingStatus:
-    """Runs a stored program, like POST …/teaching/program."""
-    rig.require_motion(lease)
-    rig.teaching.perform(rig.word(lease, arrived), programs.get(rig.robot.name, program).program)
-    return rig.teaching.status()

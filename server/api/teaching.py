@@ -1,16 +1,11 @@
-"""Routes for jogging, steps, programs and hand guiding, which need control of the robot; and for calibration."""
+"""Routes for jogging, steps, programs and hand guiding, which need control of the robot."""
 
 from __future__ import annotations
 
-from fastapi import Response
-
 from daq.contracts.errors import SpecError
-from daq.contracts.service.experiments import Experiment, ExperimentRequest
 from daq.contracts.service.teaching import (
-    CalibrationRequest,
     JogRequest,
     LeadRequest,
-    MeasuredGain,
     StepRequest,
     TeachingStatus,
 )
@@ -18,17 +13,11 @@ from daq.teaching.jog import require_step_speed
 from daq.teaching.program import Absolute, Instruction, Program, Relative
 from server.api.dependencies import (
     Arrived,
-    Experiments,
-    IdempotencyKey,
-    Identity,
     LeaseHeader,
-    Motions,
     Operator,
     RobotDep,
-    Turn,
     Viewer,
 )
-from server.api.experiments import submit_experiment
 from server.problems import PROBLEMS
 from server.routes import Router
 
@@ -100,39 +89,3 @@ def finish_teaching(rig: RobotDep, _: Operator, lease: LeaseHeader = None) -> Te
     rig.control.require(lease)
     rig.teaching.finish()
     return rig.teaching.status()
-
-
-@router.post("/calibrations/gain", status_code=201, response_model=Experiment, responses={200: {"model": Experiment}})
-def calibrate_gain(
-    request: CalibrationRequest,
-    rig: RobotDep,
-    experiments: Experiments,
-    motions: Motions,
-    caller: Operator,
-    response: Response,
-    _turn: Turn,
-    idempotency_key: IdempotencyKey = None,
-) -> Experiment:
-    """Queues the experiment that measures the actual proportional gain. GET …/traces/{trace}/gain then returns it.
-
-    It is checked like any experiment; the same Idempotency-Key returns the same experiment (200).
-    """
-    from daq.calibration import gain_experiment
-
-    spec = gain_experiment(tuple(sorted(set(request.joints))))
-    request_of = ExperimentRequest(spec=spec)
-    return submit_experiment(request_of, rig, experiments, motions, caller, response, None, idempotency_key)
-
-
-@router.get("/traces/{trace}/gain")
-def get_measured_gain(trace: Identity, rig: RobotDep, _: Viewer, _turn: Turn) -> tuple[MeasuredGain, ...]:
-    """Returns the actual proportional gains measured from a trace."""
-    from daq.calibration import gains_from_trace
-    from daq.traces.reader import read_trace
-
-    read = read_trace(rig.catalogue.path_of(trace), rig.catalogue.limits)
-    fields = MeasuredGain.model_fields
-    return tuple(
-        MeasuredGain.model_validate({name: value for name, value in gain.as_data().items() if name in fields})
-        for gain in gains_from_trace(read, rig.robot.machine)
-    )

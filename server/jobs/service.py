@@ -125,9 +125,9 @@ class JobService:
         self._context.jobs.remove(self._context.robot, identity)
         shutil.rmtree(self._folder(identity), ignore_errors=True)
 
-    def result_file(self, identity: str, name: str, advice: str = "run it again") -> Path:
-        """Returns the file of a job's result or report, by its name (`server.jobs.mailbox`). Raises a 404 with
-        `advice`, and a 409 if the job is not done."""
+    def result_file(self, identity: str, name: str) -> Path:
+        """Returns the file of a job's result or report, by its name (`server.jobs.mailbox`). Raises a 404,
+        and a 409 if the job is not done."""
         job = self._context.jobs.get(self._context.robot, identity)
         if job.state != "done":
             label = job_label(job.request.kind, job.submitted)
@@ -135,7 +135,7 @@ class JobService:
             raise conflict("job-state", line, "only a job that is done has a result")
         path = self._folder(identity) / name
         if not path.is_file():
-            raise not_found(f"{name} of job {identity}", advice)
+            raise not_found(f"{name} of job {identity}", "run it again")
         return path
 
     def with_progress(self, job: Job) -> Job:

@@ -17,7 +17,7 @@ import threading
 from collections.abc import Callable
 
 from daq.executors import LocalWorkers, Workers
-from daq.executors.parent import end_with_parent
+from daq.executors.local import end_with_parent
 from server import logs
 from server.jobs.lanes import LANES, SHORT_LANE_WORKERS, Lane
 from server.steady import weigh_session

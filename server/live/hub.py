@@ -24,7 +24,7 @@ from daq.contracts.service.live import (
 )
 from daq.contracts.service.robot import RobotStatus
 from daq.owner.messages import ArmReport, EventHappened, LiveSample, Opened, Progress, Report, TeachingText
-from firmware_protocol.codes import StatusFlag
+from firmware_protocol.commands import StatusFlag
 from server.clock import Clock
 from server.live.history import DIGITS, History
 from server.live.outbox import Outbox
@@ -33,9 +33,6 @@ LOOK_EVERY = 1.0
 """Longest time (s) between two reads of the status without an announced change."""
 MOST_OFTEN = 0.05
 """Shortest time (s) between two reads of the status."""
-MANY, WAITS = 8, 0.02
-"""Number of clients from which messages other than samples wait for the next sample, and the longest wait (s). The end
-of an experiment causes ten messages at once, and the event loop takes about 3 ms to send one to 50 clients."""
 PROGRESS_EVERY = 0.2
 """Time (s) between two messages about progress."""
 log = logging.getLogger("server.live")
@@ -74,8 +71,6 @@ class Hub:
         self._dirty = asyncio.Event()
         self._shown: dict[str, str] = {}
         self._watching: asyncio.Task[None] | None = None
-        self._sending: asyncio.TimerHandle | None = None
-        """Ends the wait of messages for the next sample."""
         self._experiment: Callable[[], str | None] = lambda: None
         self._progressed = 0.0
 
@@ -94,9 +89,6 @@ class Hub:
     async def close(self) -> None:
         """Stops sending messages."""
         self._loop = None
-        if self._sending is not None:
-            self._sending.cancel()
-            self._sending = None
         if self._watching is not None:
             self._watching.cancel()
             await asyncio.gather(self._watching, return_exceptions=True)
@@ -175,19 +167,9 @@ class Hub:
 
     def _put(self, topic: Topic, message: str, tick: int | None) -> None:
         now = self._clock.monotonic()
-        waits = tick is None and len(self._clients) >= MANY and self.clients >= MANY
         for client in self._clients:
             if topic in client.topics and (tick is None or tick % client.every == 0):
                 client.outbox.put(message, now, sample=tick is not None)
-                if not (waits and client.watches):
-                    client.something.set()
-        if waits and self._sending is None and self._loop is not None:
-            self._sending = self._loop.call_later(WAITS, self._send_what_waits)
-
-    def _send_what_waits(self) -> None:
-        self._sending = None
-        for client in self._clients:
-            if client.outbox:
                 client.something.set()
 
     async def _watch(self) -> None:

@@ -92,8 +92,6 @@ class Store:
         self._readers = sessionmaker(self.engine, expire_on_commit=False)
         self._writers = sessionmaker(self.engine.execution_options(writing=True), expire_on_commit=False)
         self._writing = threading.RLock()
-        self.version = 0
-        """Grows with every writing session. No other process writes what lists show (`sole_use`)."""
         self._last = threading.local()
         """The last statement that each thread has sent."""
         event.listen(self.engine, "before_cursor_execute", self._note_statement)
@@ -123,12 +121,8 @@ class Store:
     def writing(self) -> Iterator[Session]:
         """A session whose changes are on the disk when it ends: all of them or none. Raises DamagedError for rows that
         this program cannot have written; other errors within the block pass unchanged."""
-        with self._writing:
-            try:
-                with self._told_of_damage(_is_of_a_row), self._writers.begin() as session:
-                    yield session
-            finally:
-                self.version += 1
+        with self._writing, self._told_of_damage(_is_of_a_row), self._writers.begin() as session:
+            yield session
 
     @contextmanager
     def _told_of_damage(self, is_damage: Callable[[Exception], bool] = lambda _error: True) -> Iterator[None]:

@@ -21,7 +21,7 @@ from server.experiments.states import Event, IllegalEventError, Waiting, advance
 from server.problems import conflict
 from server.store.engine import Store
 from server.store.labels import experiment_label
-from server.store.pages import Cursor, KeptPages, latest_first, newest_first, page_of
+from server.store.pages import Cursor, latest_first, newest_first, page_of
 from server.store.rows import row_of
 from server.store.submitted import approval_of, approve, given_to, made_before, new_columns, require_approvable, void
 from server.store.submitted import digest_of as digest_of_request
@@ -39,7 +39,6 @@ class ExperimentStore:
         self._store = store
         self._counting = threading.Lock()
         self._waiting: dict[str, int] = {}
-        self._pages: KeptPages[Experiment] = KeptPages(store)
 
     @contextmanager
     def _changing(self, robot: str) -> Iterator[Session]:
@@ -103,16 +102,12 @@ class ExperimentStore:
             query = query.where(ExperimentRow.state.in_(states))
         if schedule is not None:
             query = query.where(ExperimentRow.schedule == schedule)
-
-        def read() -> Page[Experiment]:
-            if order == "submitted":
-                return newest_first(self._store, query, ExperimentRow.sequence, cursor, limit, as_experiment)
-            ended = query.where(ExperimentRow.ended.is_not(None))
-            ended = latest_first(ended, ExperimentRow.ended, ExperimentRow.id, cursor).limit(limit + 1)
-            with self._store.reading() as session:
-                return page_of(list(session.scalars(ended)), limit, as_experiment, _place_by_end)
-
-        return self._pages.page((robot, tuple(states), schedule, cursor, limit, order), read)
+        if order == "submitted":
+            return newest_first(self._store, query, ExperimentRow.sequence, cursor, limit, as_experiment)
+        ended = query.where(ExperimentRow.ended.is_not(None))
+        ended = latest_first(ended, ExperimentRow.ended, ExperimentRow.id, cursor).limit(limit + 1)
+        with self._store.reading() as session:
+            return page_of(list(session.scalars(ended)), limit, as_experiment, _place_by_end)
 
     def due(self, robot: str, now: datetime, *, approved: bool = False) -> list[Waiting]:
         """Returns the first queued and due experiment, if any; with `approved`, the first approved one. Reads one row,

@@ -6,10 +6,10 @@ from __future__ import annotations
 import base64
 import binascii
 import json
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Any, Generic, Self, TypeVar
+from typing import Any, Self, TypeVar
 
 from sqlalchemy import Select, or_
 from sqlalchemy.orm import InstrumentedAttribute
@@ -20,8 +20,6 @@ from server.store.engine import Store
 
 Row = TypeVar("Row")
 Item = TypeVar("Item")
-MOST_KEPT, LARGEST_KEPT = 16, 100
-"""Pages of a list that are kept, and most rows of one."""
 
 
 @dataclass(frozen=True)
@@ -59,28 +57,6 @@ def page_of(
     shown = rows[:limit]
     following = str(place(shown[-1])) if len(rows) > limit and shown else None
     return Page(items=tuple(convert(row) for row in shown), next=following)
-
-
-class KeptPages(Generic[Item]):
-    """The latest pages of one list. A page stays valid until the database is written: after a change everybody who
-    watches asks for the same one."""
-
-    def __init__(self, store: Store) -> None:
-        self._store = store
-        self._kept: dict[Hashable, tuple[int, Page[Item]]] = {}
-
-    def page(self, asked: Hashable, read: Callable[[], Page[Item]]) -> Page[Item]:
-        """Returns the page for a question; `read` reads it from the database."""
-        version = self._store.version  # before reading: a later change makes the page old
-        kept = self._kept.get(asked)
-        if kept is not None and kept[0] == version:
-            return kept[1]
-        page = read()
-        if len(self._kept) >= MOST_KEPT:
-            self._kept.clear()
-        if len(page.items) <= LARGEST_KEPT:
-            self._kept[asked] = version, page
-        return page
 
 
 def latest_first(

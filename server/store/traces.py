@@ -17,7 +17,7 @@ from daq.traces.catalogue import TraceSummary
 from server.problems import conflict
 from server.store.engine import Store
 from server.store.labels import label_of_row, trace_label, user_label
-from server.store.pages import Cursor, KeptPages, latest_first, page_of
+from server.store.pages import Cursor, latest_first, page_of
 from server.store.rows import row_of
 from server.store.tables import JobRow, TraceRow, TraceTagRow, TraceUseRow, spaced
 
@@ -46,7 +46,6 @@ class TraceStore:
 
     def __init__(self, store: Store) -> None:
         self._store = store
-        self._pages: KeptPages[CatalogueEntry] = KeptPages(store)
 
     def insert(
         self,
@@ -110,10 +109,6 @@ class TraceStore:
 
     def page(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
         """Returns a page of the list, newest first."""
-        asked = (robot, search, cursor, limit)
-        return self._pages.page(asked, lambda: self._read_page(robot, search, cursor, limit))
-
-    def _read_page(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
         # SQLite ends a pattern at NUL, and would find everything; nothing can match.
         if any("\0" in one for one in (search.text, search.tag, search.kind) if one):
             return Page(items=())

@@ -7,6 +7,7 @@ import pytest
 from daq.driver import EVERY_JOINT, Controller
 from daq.link import LinkState, RequestRefusedError
 from firmware_protocol import commands as c
+from firmware_protocol.joints import ALL_JOINTS
 from firmware_protocol.units import posture_to_counts
 
 AT_REST_COUNTS = 12
@@ -96,7 +97,7 @@ def test_requests_beyond_a_controllers_capabilities_are_refused(controller: Cont
     assert caught.value.reason == c.Refusal.BAD_ADDRESS
     if c.Capability.SAMPLE not in capabilities:
         with pytest.raises(RequestRefusedError) as caught:
-            link.request(c.Sample(c.AFTER_NEWEST, c.ALL_JOINTS), c.Snapshot)
+            link.request(c.Sample(c.AFTER_NEWEST, ALL_JOINTS), c.Snapshot)
         assert caught.value.reason == c.Refusal.NOT_CAPABLE
     if c.Capability.LOCK_STEP not in capabilities:
         with pytest.raises(RequestRefusedError) as caught:

@@ -8,12 +8,14 @@ import pytest
 from firmware_protocol import commands as c
 from firmware_protocol.dialect import FramedDialect
 from firmware_protocol.framing import encode_frame
+from firmware_protocol.message import Reply
+from firmware_protocol.session import to_frame
 from tests.contract.conftest import UnderContract
 
 REPLY_S = 5.0
 QUIET_S = 0.1
 pytestmark = pytest.mark.motion
-Answer = Callable[[int, bytes], c.Reply]
+Answer = Callable[[int, bytes], Reply]
 
 
 @pytest.fixture
@@ -24,9 +26,9 @@ def answer(under_contract: UnderContract) -> Iterator[Answer]:
         while channel.read(QUIET_S):
             pass  # late replies to what the connection before asked twice
 
-        def answered(sequence: int, before: bytes) -> c.Reply:
-            channel.write(before + encode_frame(c.to_frame(sequence, c.ReadStatus())))
-            arrived: list[tuple[int, c.Reply]] = []
+        def answered(sequence: int, before: bytes) -> Reply:
+            channel.write(before + encode_frame(to_frame(sequence, c.ReadStatus())))
+            arrived: list[tuple[int, Reply]] = []
             while not arrived:
                 data = channel.read(REPLY_S)
                 assert data, "no reply"
@@ -40,7 +42,7 @@ def answer(under_contract: UnderContract) -> Iterator[Answer]:
 
 @pytest.mark.parametrize(
     "noise",
-    [b"\x01", b"\xff" * 300, bytes(range(256)), b"\x00\x05\x01\x02", encode_frame(c.to_frame(9, c.Stop()))[:-2]],
+    [b"\x01", b"\xff" * 300, bytes(range(256)), b"\x00\x05\x01\x02", encode_frame(to_frame(9, c.Stop()))[:-2]],
     ids=["a byte", "a long burst", "every byte", "half a frame", "a stop cut short"],
 )
 def test_noise_before_a_frame_harms_nothing(answer: Answer, noise: bytes) -> None:
@@ -48,6 +50,6 @@ def test_noise_before_a_frame_harms_nothing(answer: Answer, noise: bytes) -> Non
 
 
 def test_a_damaged_frame_is_not_answered(answer: Answer) -> None:
-    damaged = bytearray(encode_frame(c.to_frame(40, c.ReadStatus())))
+    damaged = bytearray(encode_frame(to_frame(40, c.ReadStatus())))
     damaged[4] ^= 0x20
     assert isinstance(answer(41, bytes(damaged)), c.Status)

@@ -1,4 +1,4 @@
-"""docs/command-line.md shows every command there is, no other; what docs/your-robot.md types can be typed."""
+"""docs/command-line.md shows every command there is, and no other."""
 
 import importlib
 import pkgutil
@@ -18,8 +18,7 @@ from daq_cli.app.subcommands import subcommands
 from tests.daq_cli.invoke import CommandLine
 
 ROOT = Path(__file__).parents[2]
-PAGE, YOUR_ROBOT = ((ROOT / "docs" / name).read_text("utf-8") for name in ("command-line.md", "your-robot.md"))
-LINES = re.findall(r"^\$ daq (.*)$", YOUR_ROBOT, re.MULTILINE)
+PAGE = (ROOT / "docs" / "command-line.md").read_text("utf-8")
 SHOWN = [shlex.split(text) for text in re.findall(r"^- .*: `daq ([^`]+)`$", PAGE, re.MULTILINE)]
 EXAMPLES = [words for words in SHOWN if words[0] in subcommands()]
 """Of what is installed: the page also shows what is optional."""
@@ -51,7 +50,7 @@ def test_every_command_has_an_example() -> None:
     assert {command_of(words) for words in EXAMPLES} == set(COMMANDS)
 
 
-@pytest.mark.parametrize("words", [*EXAMPLES, *map(shlex.split, LINES)], ids=" ".join)
+@pytest.mark.parametrize("words", EXAMPLES, ids=" ".join)
 def test_every_example_can_be_typed(words: list[str]) -> None:
     name = command_of(words)
     if name != ("mock",):  # its options are the mock's own
@@ -78,20 +77,6 @@ def test_every_exit_code_is_explained() -> None:
     assert explained == used
 
 
-# ---- docs/your-robot.md: its settings are settings
-
-
-(SETTINGS,) = re.findall(r"```toml\n(\[robot\]\n.*?)```", YOUR_ROBOT, re.DOTALL)
-
-
-def test_the_check_of_the_page_s_settings_speaks_of_its_dialect_and_of_no_memory_map(
-    daq: CommandLine, tmp_path: Path
-) -> None:
-    settings = SETTINGS.replace("examples/", f"{ROOT}/examples/").replace("$PWD", str(tmp_path))
-    (tmp_path / "daq.toml").write_text(settings)
-    said = daq("--config", tmp_path / "daq.toml", "config", "check")
-    assert said.code == 0, said.err
-    assert "dialect:       dynamixel" in said.out
-    assert "memory map:" not in said.out
-    (tmp_path / "daq.toml").write_text(settings.replace("dynamixel", "nobodys"))
+def test_a_dialect_that_is_unknown_is_told_by_the_check_of_settings(daq: CommandLine, tmp_path: Path) -> None:
+    (tmp_path / "daq.toml").write_text('[robot]\nport = "serial:///dev/arm?dialect=nobodys&ids=1"\n')
     daq("--config", tmp_path / "daq.toml", "config", "check").complains(2, "dialect 'nobodys' is unknown")

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from daq.config.examples import example_files
 from daq.config.robot_files import load_memory_map
 from daq.contracts.errors import SpecError
 from daq_cli.app.output_file import replacing
+from daq_cli.commands.config import example_files
 from firmware_protocol.memory_map import default_memory_map
 from tests.daq_cli.invoke import CommandLine
 
@@ -83,7 +83,7 @@ def test_examples_that_cannot_all_be_copied_leave_no_folder(
     daq: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     known, target = example_files(), tmp_path / "copied"
-    monkeypatch.setattr("daq.config.examples.example_files", lambda: (*known, tmp_path / "gone"))
+    monkeypatch.setattr("daq_cli.commands.config.example_files", lambda: (*known, tmp_path / "gone"))
     before = set(tmp_path.iterdir())
     daq("config", "copy", "examples", "-o", target).complains(2, "copied: cannot be written: No such file")
     assert set(tmp_path.iterdir()) == before

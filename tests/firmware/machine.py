@@ -7,6 +7,8 @@ from typing import Any
 from firmware_protocol import commands as c
 from firmware_protocol.framing import Frame, FrameDecoder, encode_frame
 from firmware_protocol.memory_map import JOINTS, default_memory_map
+from firmware_protocol.message import Request, Stamp
+from firmware_protocol.session import parse_reply, to_frame
 from firmware_protocol.units import posture_to_counts
 from tests.firmware.compiled import made
 from tests.firmware.core import Core, PeriodSource
@@ -62,7 +64,7 @@ class Machine:
         self.memory = bytearray(MAP.size)
         self._decoder = FrameDecoder()
         self._sequence = 0
-        self._stamp = c.Stamp(0, 0)
+        self._stamp = Stamp(0, 0)
         self.power_up()
         library = made(f"libbridge-{ring}.so", f"RING={ring}")
         self.core = Core(library, self._read, self._write, lambda: self.now_us & 0xFFFFFFFF, source)
@@ -158,15 +160,15 @@ class Machine:
         """Lets periods pass."""
         self.run(count * PERIOD_US)
 
-    def send(self, request: c.Request) -> int:
+    def send(self, request: Request) -> int:
         """Puts a request on the line, a command with its stamp; its sequence number."""
         self._sequence += 1
         if request.IS_COMMAND:
-            self._stamp = c.Stamp(self._stamp.session, self._stamp.number + 1)
-        self._waiting += encode_frame(c.to_frame(self._sequence, request, self._stamp))
+            self._stamp = Stamp(self._stamp.session, self._stamp.number + 1)
+        self._waiting += encode_frame(to_frame(self._sequence, request, self._stamp))
         return self._sequence
 
-    def ask(self, request: c.Request, within_us: int = 2 * PERIOD_US) -> Any:
+    def ask(self, request: Request, within_us: int = 2 * PERIOD_US) -> Any:
         """The reply to a request."""
         sequence, end_us = self.send(request), self.now_us + within_us
         while self.now_us < end_us:
@@ -174,13 +176,13 @@ class Machine:
             for frame in self.said:
                 if frame.sequence == sequence:
                     self.said.remove(frame)
-                    return c.parse_reply(frame)
+                    return parse_reply(frame)
         raise AssertionError(f"no reply to {request}")
 
     def greet(self) -> None:
         """Begins a session."""
         reply = self.ask(c.Hello(c.PROTOCOL_VERSION, 0x600D + self.now_us))
-        self._stamp = c.Stamp(reply.session, 0)
+        self._stamp = Stamp(reply.session, 0)
 
     def release(self) -> None:
         """Ends the freeze that is in force."""

@@ -2,9 +2,10 @@
 
 from typing import Any
 
-from firmware_protocol.commands import PROTOCOL_VERSION, Hello, ReadStatus, Release, Released, Reply, Request, Status
+from firmware_protocol.commands import PROTOCOL_VERSION, Hello, ReadStatus, Release, Released, Status
 from firmware_protocol.dialect import IDLE_MARK, FramedDialect
 from firmware_protocol.framing import FrameDecoder, encode_frame
+from firmware_protocol.message import Reply, Request
 from mock_controller.device import Device, build_device
 from mock_controller.options import Options
 from mock_controller.pace import LockStepPace, RealTimePace

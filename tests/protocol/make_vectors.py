@@ -10,9 +10,9 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from firmware_protocol import commands as c
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.framing import Frame, crc16, encode_frame, stuff
+from firmware_protocol.session import parse_reply, parse_request, refusal_of, to_frame
 from firmware_protocol.units import counts_to_posture, posture_to_counts
 from tests.protocol.play import message_of, play, second_bridge_for
 
@@ -21,16 +21,16 @@ Vector = Mapping[str, Any]
 
 
 def _framed(vector: Vector) -> Vector:
-    frame = c.to_frame(vector["sequence"], *message_of(vector["message"], vector["fields"]))
+    frame = to_frame(vector["sequence"], *message_of(vector["message"], vector["fields"]))
     return {**vector, "frame": encode_frame(frame).hex()}
 
 
 def _refused(vector: Vector) -> Vector:
-    parse = c.parse_request if vector["direction"] == "request" else c.parse_reply
+    parse = parse_request if vector["direction"] == "request" else parse_reply
     try:
         parse(Frame(0, vector["opcode"], bytes.fromhex(vector["payload"])))
     except ProtocolError as error:
-        return {**vector, "reason": c.refusal_of(error).name}
+        return {**vector, "reason": refusal_of(error).name}
     raise AssertionError(f"{vector['why']}: accepted")
 
 

@@ -7,7 +7,9 @@ from typing import Any, Protocol
 
 from firmware_protocol import commands as c
 from firmware_protocol.framing import Frame, FrameDecoder, encode_frame
-from firmware_protocol.message import Message
+from firmware_protocol.joints import CompactReading, JointReading
+from firmware_protocol.message import Message, Request, Stamp
+from firmware_protocol.session import UNSTAMPED, parse_reply, to_frame
 from tests.protocol.second_bridge import CompactSecondBridge, SecondBridge
 
 NAME = re.compile(r"\$(\w+?)([+-]\d+)?")
@@ -16,7 +18,7 @@ KINDS: dict[str, type[Message]] = {kind.__name__: kind for kind in (*c.REQUESTS.
 
 def as_json(value: Any) -> Any:
     """A message's fields as JSON: bytes in hex, tuples as arrays, readings as objects."""
-    if isinstance(value, Message | c.JointReading | c.CompactReading):
+    if isinstance(value, Message | JointReading | CompactReading):
         return {name: as_json(field) for name, field in vars(value).items()}
     if isinstance(value, bytes):
         return value.hex()
@@ -98,7 +100,7 @@ def play(steps: Sequence[Mapping[str, Any]], partner: Partner, choose: Callable[
             lines.append(line)
         else:
             frame = partner.reply(step["sequence"])
-            reply = c.parse_reply(frame)
+            reply = parse_reply(frame)
             assert type(reply).__name__ == step["bridge"], f"{where}: {reply}"
             _match(step["fields"], as_json(reply), names, f"{where}: {reply}")
             lines.append(encode_frame(frame))
@@ -110,15 +112,15 @@ def _request(step: Mapping[str, Any], names: dict[str, int], choose: Callable[[]
     if "payload" in step:
         return Frame(step["sequence"], step["host"], bytes.fromhex(step["payload"]))
     fields = {name: _filled(value, names, choose) for name, value in step["fields"].items()}
-    return c.to_frame(step["sequence"], *message_of(step["host"], fields))
+    return to_frame(step["sequence"], *message_of(step["host"], fields))
 
 
-def message_of(name: str, fields: Mapping[str, Any]) -> tuple[Message, c.Stamp]:
+def message_of(name: str, fields: Mapping[str, Any]) -> tuple[Message, Stamp]:
     """A message and its stamp from fields as JSON has them: `as_json` undone."""
     kind, values = KINDS[name], {field: _from_json(field, value) for field, value in fields.items()}
-    stamp = c.UNSTAMPED
-    if issubclass(kind, c.Request) and kind.IS_COMMAND:
-        stamp = c.Stamp(values.pop("session"), values.pop("number"))
+    stamp = UNSTAMPED
+    if issubclass(kind, Request) and kind.IS_COMMAND:
+        stamp = Stamp(values.pop("session"), values.pop("number"))
     return kind(**values), stamp
 
 
@@ -126,7 +128,7 @@ def _from_json(field: str, value: Any) -> Any:
     if isinstance(value, list):
         return tuple(_from_json("", item) for item in value)
     if isinstance(value, dict):
-        return c.JointReading(**value) if "set_point" in value else c.CompactReading(**value)
+        return JointReading(**value) if "set_point" in value else CompactReading(**value)
     return bytes.fromhex(value) if field == "data" else value
 
 

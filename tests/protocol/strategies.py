@@ -5,13 +5,15 @@ from typing import TypeVar
 from hypothesis import strategies as st
 
 from firmware_protocol import commands as c
+from firmware_protocol.joints import ALL_JOINTS, CompactReading, JointReading
+from firmware_protocol.message import Reply, Request
 
 T = TypeVar("T")
 u8, u16, u32, u64 = (st.integers(0, (1 << bits) - 1) for bits in (8, 16, 32, 64))
-masks = st.integers(1, c.ALL_JOINTS)
+masks = st.integers(1, ALL_JOINTS)
 joint_sets = st.sets(st.integers(1, 6), min_size=1).map(sorted)
 readings = st.builds(
-    c.JointReading,
+    JointReading,
     set_point=st.integers(0, 1023),
     position=st.integers(0, 4095),
     error=st.integers(-0x8000, 0x7FFF),
@@ -19,7 +21,7 @@ readings = st.builds(
 )
 
 compact_readings = st.builds(
-    c.CompactReading, position=st.integers(0, 4095), error=st.integers(-2048, 2047), power=st.integers(-0x80, 0x7F)
+    CompactReading, position=st.integers(0, 4095), error=st.integers(-2048, 2047), power=st.integers(-0x80, 0x7F)
 )
 
 
@@ -31,7 +33,7 @@ def of_joints(values: st.SearchStrategy[T]) -> st.SearchStrategy[tuple[tuple[int
 gain = st.integers(0, 20)
 postures = st.integers(0, 999)
 
-REQUESTS: dict[type[c.Request], st.SearchStrategy[c.Request]] = {
+REQUESTS: dict[type[Request], st.SearchStrategy[Request]] = {
     c.Hello: st.builds(c.Hello, st.just(c.PROTOCOL_VERSION), u32),
     c.ReadBlock: st.builds(c.ReadBlock, st.integers(0, 0xFFFF - 47), st.integers(1, 48)),
     c.WriteBlock: st.builds(c.WriteBlock, st.integers(0, 0xFFFF - 37), st.binary(min_size=1, max_size=38)),
@@ -49,7 +51,7 @@ REQUESTS: dict[type[c.Request], st.SearchStrategy[c.Request]] = {
     c.ReadStatus: st.builds(c.ReadStatus),
     c.Advance: st.builds(c.Advance, u32),
 }
-REPLIES: dict[type[c.Reply], st.SearchStrategy[c.Reply]] = {
+REPLIES: dict[type[Reply], st.SearchStrategy[Reply]] = {
     c.HelloReply: st.builds(c.HelloReply, u8, u16, u32, u8, u16, u32, st.integers(1, 0xFFFFFFFF)),
     c.Block: st.builds(c.Block, st.binary(min_size=1, max_size=48)),
     c.BlockWritten: st.builds(c.BlockWritten),

@@ -14,9 +14,10 @@ from firmware_protocol import commands as c
 from firmware_protocol import framing
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.framing import Frame, FrameDecoder, crc16, encode_frame, stuff
+from firmware_protocol.joints import JointReading, mask_of
 from firmware_protocol.memory_map import default_memory_map
-from firmware_protocol.message import Message
-from firmware_protocol.stamp import LARGEST_NUMBER
+from firmware_protocol.message import LARGEST_NUMBER, Message, Request, Stamp
+from firmware_protocol.session import UNSTAMPED, parse_reply, parse_request, stamp_of, to_frame
 from firmware_protocol.units import GAIN_MAX, counts_to_posture, posture_to_counts
 from tests.protocol.make_vectors import FILE
 from tests.protocol.play import as_json, message_of
@@ -57,7 +58,7 @@ def test_constants_and_example_of_a_frame_are_those_of_the_document() -> None:
     # The documents example frame is what the code makes
     steps = {step: bytes.fromhex(data) for step, data in table("A frame step by step")}
     request = c.WriteSetPoints(((1, 500), (2, 508), (3, 515)))
-    frame = c.to_frame(1, request, c.Stamp(0x10001, 1))
+    frame = to_frame(1, request, Stamp(0x10001, 1))
     header = bytes((len(frame.payload), 1, 0, frame.opcode))
     with_crc = header + frame.payload + crc16(header + frame.payload).to_bytes(2, "big")
     assert steps == {
@@ -109,21 +110,21 @@ def flat(message: Message) -> dict[str, list[int]]:
     """The same from the message's own fields."""
     match message:
         case c.WriteSetPoints():
-            mask = c.mask_of(joint for joint, _ in message.postures)
+            mask = mask_of(joint for joint, _ in message.postures)
             values = {"mask": [mask], "set_point": [posture for _, posture in message.postures]}
         case c.ErrorsPositionsPowers() | c.Snapshot():
-            values = {"mask": [c.mask_of(joint for joint, _ in message.joints)]}
+            values = {"mask": [mask_of(joint for joint, _ in message.joints)]}
             for name in ("set_point", "position", "error", "power"):
                 values[name] = [getattr(reading, name) for _, reading in message.joints]
             if isinstance(message, c.Snapshot):
                 values |= {"tick": [message.tick], "status": [message.status]}
         case c.MoveAndSample():
-            mask = c.mask_of(joint for joint, _ in message.postures)
+            mask = mask_of(joint for joint, _ in message.postures)
             values = {"after": [message.after], "sampled": [message.sampled], "mask": [mask]}
             values |= {"set_point": [posture for _, posture in message.postures]} if message.postures else {}
         case c.CompactSnapshot():
             values = {name: [getattr(message, name)] for name in ("tick", "status", "taken")}
-            values |= {"mask": [c.mask_of(joint for joint, _ in message.joints)]}
+            values |= {"mask": [mask_of(joint for joint, _ in message.joints)]}
             values |= {"packed": [reading.packed for _, reading in message.joints]}
         case c.Gains():
             values = {name: [gains[i] for gains in message.gains] for i, name in enumerate("pid")}
@@ -138,11 +139,11 @@ def flat(message: Message) -> dict[str, list[int]]:
     return values
 
 
-STAMP = c.Stamp(0x01020304, 0x05060708)
+STAMP = Stamp(0x01020304, 0x05060708)
 
 
 def is_command(message: Message) -> bool:
-    return isinstance(message, c.Request) and message.IS_COMMAND
+    return isinstance(message, Request) and message.IS_COMMAND
 
 
 def documented_messages() -> dict[str, list[str]]:
@@ -163,7 +164,7 @@ WHOLE = [m for m in MESSAGES if not isinstance(m, c.HelloReply) or m.session != 
 @pytest.mark.parametrize("message", WHOLE, ids=lambda message: type(message).__name__)
 def test_layouts_and_lengths_of_messages_are_those_of_the_document(message: Message) -> None:
     _, _, layout, length, *_ = documented_messages()[type(message).__name__]
-    payload = c.to_frame(0, message, STAMP).payload
+    payload = to_frame(0, message, STAMP).payload
     values = read_payload(layout, payload)
     stamped = {name: [value] for name, value in vars(STAMP).items()} if is_command(message) else {}
     assert values == stamped | flat(message)
@@ -185,10 +186,10 @@ def test_ranges_of_values_are_those_of_the_document() -> None:
 
     for name, field in (("set_point in a reading", 0), ("position", 1), ("error", 2), ("power", 3)):
         for value in limits(name):
-            c.JointReading(*(value if i == field else 0 for i in range(4)))
+            JointReading(*(value if i == field else 0 for i in range(4)))
         for value in (limits(name)[0] - 1, limits(name)[1] + 1):
             with pytest.raises(ProtocolError):
-                c.JointReading(*(value if i == field else 0 for i in range(4)))
+                JointReading(*(value if i == field else 0 for i in range(4)))
     assert limits("p, i, d in SetGains") == (0, GAIN_MAX)
     assert limits("count in ReadBlock") == (1, c.MAX_READ)
     assert limits("tick")[1] == c.AFTER_NEWEST
@@ -209,11 +210,11 @@ def test_every_example_of_the_conversation_is_what_the_code_says_by_its_rules() 
     assert len(rows) >= 10
     for name, sequence, fields, line in rows:
         (frame,) = FrameDecoder().feed(bytes.fromhex(line))
-        message = c.parse_request(frame) if frame.opcode < 0x80 else c.parse_reply(frame)
-        stamp = c.stamp_of(frame) if is_command(message) else None
+        message = parse_request(frame) if frame.opcode < 0x80 else parse_reply(frame)
+        stamp = stamp_of(frame) if is_command(message) else None
         told = (vars(stamp) if stamp else {}) | as_json(message)
         assert (type(message).__name__, frame.sequence, told) == (name, int(sequence), json.loads(fields))
-        assert encode_frame(c.to_frame(frame.sequence, message, stamp or c.UNSTAMPED)) == bytes.fromhex(line)
+        assert encode_frame(to_frame(frame.sequence, message, stamp or UNSTAMPED)) == bytes.fromhex(line)
     # The conversation is true to its own rules
     said = {row[0]: json.loads(row[2]) for row in reversed(table("A conversation"))}
     sent = dict(said["WriteSetPoints"]["postures"])
@@ -256,11 +257,11 @@ def test_the_memory_map_is_the_one_that_ships() -> None:
 
 
 def on_the_line(*messages: Message) -> int:
-    return sum(len(encode_frame(c.to_frame(0, message))) for message in messages)
+    return sum(len(encode_frame(to_frame(0, message))) for message in messages)
 
 
 def sampled(joints: int) -> int:
-    reading = c.JointReading(1, 1, 1, 1)
+    reading = JointReading(1, 1, 1, 1)
     mask = (1 << joints) - 1
     return on_the_line(c.Sample(1, mask), c.Snapshot(1, 0, tuple((i + 1, reading) for i in range(joints))))
 

@@ -10,6 +10,8 @@ import pytest
 from firmware_protocol import commands as c
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.framing import Frame, FrameDecoder, encode_frame, unstuff
+from firmware_protocol.message import Request
+from firmware_protocol.session import UNSTAMPED, parse_reply, parse_request, stamp_of, to_frame
 from firmware_protocol.units import counts_to_posture, posture_to_counts
 from mock_controller.bridge.bridge import Bridge
 from mock_controller.timeline import Timeline
@@ -42,11 +44,11 @@ def test_broken_stuffing_is_refused(encoded: str) -> None:
 def test_frames_agree_with_the_vectors(vector: dict[str, Any]) -> None:
     line = bytes.fromhex(vector["frame"])
     (frame,) = FrameDecoder().feed(line)
-    message = c.parse_request(frame) if frame.opcode < 0x80 else c.parse_reply(frame)
-    stamp = c.stamp_of(frame) if isinstance(message, c.Request) and message.IS_COMMAND else c.UNSTAMPED
-    fields = as_json(message) if stamp == c.UNSTAMPED else {**vars(stamp), **as_json(message)}
+    message = parse_request(frame) if frame.opcode < 0x80 else parse_reply(frame)
+    stamp = stamp_of(frame) if isinstance(message, Request) and message.IS_COMMAND else UNSTAMPED
+    fields = as_json(message) if stamp == UNSTAMPED else {**vars(stamp), **as_json(message)}
     assert (type(message).__name__, frame.sequence, fields) == (vector["message"], vector["sequence"], vector["fields"])
-    assert encode_frame(c.to_frame(frame.sequence, message, stamp)) == line
+    assert encode_frame(to_frame(frame.sequence, message, stamp)) == line
     assert second.read_frame(line[1:-1]) == (frame.sequence, frame.opcode, frame.payload)
     assert second.frame_of(frame.sequence, frame.opcode, frame.payload) == line
 

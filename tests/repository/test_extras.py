@@ -13,7 +13,7 @@ import pytest
 from packaging.requirements import Requirement
 
 import ma2000
-from daq.client.websocket import WebSocket
+from daq.client.live import WebSocket
 from daq.contracts.extras import CONTAINS, EXTRA_OF, Extra, MissingExtraError, missing_extras_named
 from daq.contracts.trace import Trace
 from daq.transport import MockPort

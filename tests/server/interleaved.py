@@ -37,6 +37,7 @@ from daq.runner.arm_control import ArmControl
 from daq.runner.preparation import require_not_stopped
 from daq.teaching.controller_arm import ControllerArm
 from firmware_protocol import commands as c
+from firmware_protocol.message import Request
 from server.experiments.review import Review
 from server.experiments.states import Waiting
 from server.queue.context import QueueContext
@@ -141,14 +142,14 @@ class Wire:
         self.faults: list[str] = []
         self.motions = self.stops = 0
 
-    def request(self, request: c.Request, _kind: object, before_stop: int | None = None) -> Any:
+    def request(self, request: Request, _kind: object, before_stop: int | None = None) -> Any:
         """One request and its reply, each of which takes time."""
         return self.exchange(request, before_stop=before_stop)[0]
 
-    def exchange_timed(self, *requests: c.Request) -> tuple[tuple[Any, ...], tuple[float, ...]]:
+    def exchange_timed(self, *requests: Request) -> tuple[tuple[Any, ...], tuple[float, ...]]:
         return self.exchange(*requests), (0.0,) * len(requests)
 
-    def exchange(self, *requests: c.Request, before_stop: int | None = None) -> tuple[Any, ...]:
+    def exchange(self, *requests: Request, before_stop: int | None = None) -> tuple[Any, ...]:
         """Requests that are written together reach the board together."""
         self.world.step()
         if before_stop is not None and before_stop != self.stops:
@@ -164,7 +165,7 @@ class Wire:
     def stop(self) -> Any:
         return self.request(c.Stop(), c.Stopped)
 
-    def _answer(self, request: c.Request) -> Any:  # noqa: PLR0911 - one for each kind of request
+    def _answer(self, request: Request) -> Any:  # noqa: PLR0911 - one for each kind of request
         me = cast(Actor, greenlet.getcurrent())
         match request:
             case c.Stop():

@@ -19,7 +19,7 @@ from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.file_lock import take_lock
 from daq.contracts.machine import Machine
 from daq.executors import Workers, done_in_any_order
-from daq.executors.each import growing
+from daq.executors.local import growing
 from model.machine_model.model import base_model
 from model.trial.score import Score, score, score_of_failure
 from model.trial.table import TrialTable, trial_table

@@ -56,7 +56,7 @@ def blind(
     """Hide effects in the mock, diagnose blindly, reveal, and score."""
     from daq.contracts.extras import require_extra
     from daq.executors import LocalWorkers
-    from daq.executors.workers import ending
+    from daq.executors.local import ending
     from trials.blind.campaign import Campaign
     from trials.blind.folder import TrialFolder
     from trials.blind.registered import to_register

@@ -6,8 +6,7 @@ from typing import Annotated, Literal, Self, TypeVar
 
 from pydantic import AwareDatetime, Field, StrictBool, model_validator
 
-from daq.contracts.experiment import ExperimentSpec
-from daq.contracts.in_unit import InUnit
+from daq.contracts.experiment import ExperimentSpec, InUnit
 from daq.contracts.labels import Outcome
 from daq.contracts.service.base import Moment, UserWire, Wire
 from daq.contracts.service.queue import Reviewer

@@ -76,22 +76,3 @@ class ProgramEntry(Wire):
     instructions: int
     changed: AwareDatetime
     changed_by: str
-
-
-class CalibrationRequest(Wire):
-    """Joints whose actual proportional gain is measured by small steps at several postures (section 6.5)."""
-
-    joints: Annotated[tuple[JointNumber, ...], Field(min_length=1)] = (1, 2, 3)
-
-
-class MeasuredGain(Wire):
-    """The actual proportional gain of one joint, in DAC counts per ADC count of error, and in V/rad at the motor; or
-    the reason why the trace does not determine it. All gains between `lowest` and `highest` agree with every sample."""
-
-    joint: int
-    gain: float | None = None
-    standard_error: float | None = None
-    lowest: float | None = None
-    highest: float | None = None
-    volts_per_rad: float | None = None
-    reason: str = ""

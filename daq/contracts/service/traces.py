@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import AwareDatetime, Field
 
-from daq.contracts.figures import JointFigureSet
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.labels import Outcome, Source, Tag
 from daq.contracts.service.base import Wire
 from daq.contracts.trace import TraceEvent, TraceRecord
@@ -39,6 +39,26 @@ class CatalogueEntry(Wire):
     notes: str = ""
     missing: bool = False
     """Whether its file is gone from the folder."""
+
+
+class JointFigureSet(FrozenRecord):
+    """Figures of one joint: angles in degrees (`unit` °), lengths in mm on a prismatic joint; times in s, drive in the
+    trace's unit.
+
+    `overshoot`: how far the joint went beyond the last set point, in the direction of the motion. `rise_time`: time of
+    the position from 10 to 90 % of the motion. Both are None without set points or motion.
+    """
+
+    joint: int
+    unit: str
+    moved: bool
+    start: float
+    end: float
+    overshoot: float | None
+    rise_time: float | None
+    largest_error: float | None
+    final_error: float | None
+    largest_drive: float | None
 
 
 class TraceDetails(Wire):

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from daq.driver import Controller
     from extras.commissioning.memory.commands import CommandProof
     from extras.commissioning.memory.findings import Findings
-    from firmware_protocol.commands import Reply, Request
+    from firmware_protocol.message import Reply, Request
 
 R = TypeVar("R", bound="Reply")
 
@@ -174,7 +174,7 @@ def _of_the_bridge(controller: Controller, request: Request, wanted: type[R]) ->
     is the question here.
     """
     from daq.link import RequestRefusedError
-    from firmware_protocol.codes import Refusal
+    from firmware_protocol.commands import Refusal
 
     try:
         return controller.link.request(request, wanted)

@@ -68,7 +68,7 @@ class Asked:
 def run(robot: RobotAccess, asked: Asked, study: Study) -> bool:
     """Runs a batch and prints its results. Returns whether every trace is done."""
     from daq.executors import LocalWorkers, cores
-    from daq.executors.workers import ending
+    from daq.executors.local import ending
     from extras.lab.batches.folder import asked_of, opened
     from extras.lab.batches.run import run_batch
 

@@ -13,7 +13,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.progress import Cancel
 from daq.executors import LocalWorkers, cores
-from daq.executors.workers import ending
+from daq.executors.local import ending
 from daq.traces.catalogue import list_traces
 from daq.traces.query import parse_query
 from extras.lab.batches.folder import asked_of, opened

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from daq.config.limits import merged_limits
 from daq.config.robot_files import load_memory_map
-from daq.config.settings import Settings, config_files, load_settings
+from daq.config.settings import Settings, config_files, load_settings, merged_limits
 from daq.config.toml_text import settings_text
 from daq.contracts.documents import parse_json, read_document
 from daq.contracts.errors import SpecError

@@ -3,8 +3,9 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from firmware_protocol.commands import Block, ReadBlock, ReadStatus, Reply, Request, Status
+from firmware_protocol.commands import Block, ReadBlock, ReadStatus, Status
 from firmware_protocol.memory_map import MemoryMap, default_memory_map
+from firmware_protocol.message import Reply, Request
 from tests.daq.link.scripted import frame_of
 
 PERIOD_S = 0.02

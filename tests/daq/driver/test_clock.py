@@ -16,10 +16,13 @@ from daq.driver.line_rate import (
     line_rate,
     stop_latency_s,
 )
-from daq.driver.tick_time import WINDOW_TICKS, TickTime
+from daq.driver.sampling import WINDOW_TICKS, TickTime
 from firmware_protocol import commands as c
-from firmware_protocol.commands import Advance, Advanced, Request
+from firmware_protocol.commands import Advance, Advanced
 from firmware_protocol.framing import encode_frame
+from firmware_protocol.joints import CompactReading, JointReading
+from firmware_protocol.message import Message, Request
+from firmware_protocol.session import to_frame
 from tests.daq.link.scripted import ScriptedChannel, frame_of, scripted_link
 
 PERIOD_S = 0.02
@@ -136,8 +139,8 @@ def test_the_quickest_sample_counts_for_a_window_and_a_mock_that_waits_makes_non
 PERIOD = 0.020
 
 
-def on_the_line(*messages: c.Message) -> int:
-    return sum(len(encode_frame(c.to_frame(0, message))) for message in messages)
+def on_the_line(*messages: Message) -> int:
+    return sum(len(encode_frame(to_frame(0, message))) for message in messages)
 
 
 @pytest.mark.parametrize("joints", range(1, 7))
@@ -145,8 +148,8 @@ def on_the_line(*messages: c.Message) -> int:
 def test_bytes_are_those_of_the_frames(joints: int, moving: int) -> None:
     postures = tuple((joint, 500) for joint in range(1, moving + 1))
     mask = (1 << joints) - 1
-    snapshot = c.Snapshot(1, 0, tuple((joint, c.JointReading(1, 1, 1, 1)) for joint in range(1, joints + 1)))
-    compact = c.CompactSnapshot(1, 0, 0, tuple((joint, c.CompactReading(1, 1, 1)) for joint in range(1, joints + 1)))
+    snapshot = c.Snapshot(1, 0, tuple((joint, JointReading(1, 1, 1, 1)) for joint in range(1, joints + 1)))
+    compact = c.CompactSnapshot(1, 0, 0, tuple((joint, CompactReading(1, 1, 1)) for joint in range(1, joints + 1)))
     written = on_the_line(c.WriteSetPoints(postures), c.SetPointsTaken(1, 0)) if moving else 0
     assert bytes_of_a_turn(joints, moving) == on_the_line(c.Sample(1, mask), snapshot) + written
     assert bytes_of_a_compact_turn(joints, moving) == on_the_line(c.MoveAndSample(1, mask, postures), compact)

@@ -12,22 +12,23 @@ from daq.link import Link, RequestRefusedError
 from daq.transport import TransportError
 from firmware_protocol import commands as c
 from firmware_protocol.joints import JointReading
+from firmware_protocol.message import Reply, Request
 from tests.daq.link.scripted import ScriptedChannel, ScriptedEndpoint, Zeros, frame_of, says, scripted_link
 
 HELLO = c.HelloReply(2, c.Capability.SAMPLE, 20_000, 8, 3, 0, 7)
 
 
-def controller_that(answers: Callable[[c.Request], c.Reply | None], hello: c.HelloReply = HELLO) -> Controller:
+def controller_that(answers: Callable[[Request], Reply | None], hello: c.HelloReply = HELLO) -> Controller:
     """A driver over a script; `answers` None is silence."""
     script = says(lambda request: hello if isinstance(request, c.Hello) else answers(request), 0.001)
     return Controller(scripted_link(script)[0])
 
 
 def asked_of(
-    answers: Callable[[c.Request], c.Reply | None], order: Callable[[Controller], object]
-) -> tuple[list[c.Request], Any]:
+    answers: Callable[[Request], Reply | None], order: Callable[[Controller], object]
+) -> tuple[list[Request], Any]:
     """What an order asks of a board that answers so, and what it gives."""
-    asked: list[c.Request] = []
+    asked: list[Request] = []
     controller = controller_that(lambda request: asked.append(request) or answers(request))  # type: ignore[func-returns-value]
     return asked, order(controller)
 
@@ -40,7 +41,7 @@ def test_a_controller_that_cannot_be_spoken_to_is_not_kept_connected(monkeypatch
     with pytest.raises(TransportError, match=r"runs in lock-step: add \?lock_step=1 to the URL"):
         controller_that(lambda _: None, lock_step)
 
-    def newer(sequence: int, _: c.Request) -> list[tuple[float, bytes]]:
+    def newer(sequence: int, _: Request) -> list[tuple[float, bytes]]:
         return [(0.0, frame_of(sequence, c.HelloReply(3, c.Capability.SAMPLE, 20_000, 8, 1)))]
 
     link, channel = scripted_link(newer)
@@ -54,7 +55,7 @@ def test_a_recorded_short_greeting_of_the_same_version_is_no_identity() -> None:
     short = c.HelloReply(2, c.Capability.SIMULATED, 1_000, 8, 9)
     replies = iter([short, None])
 
-    def answer(sequence: int, request: c.Request) -> list[tuple[float, bytes]]:
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
         assert isinstance(request, c.Hello)
         own = c.HelloReply(2, c.Capability.SAMPLE, 20_000, 8, 3, request.nonce, 7)
         return [(0.001, frame_of(sequence, next(replies, None) or own))]
@@ -68,7 +69,7 @@ def test_a_recorded_short_greeting_of_the_same_version_is_no_identity() -> None:
 def test_a_bridge_of_version_1_is_refused_in_one_line_and_can_be_stopped_all_the_same() -> None:
     stopped = c.Stopped(7, (500,) * 6)
 
-    def version_1(sequence: int, request: c.Request) -> list[tuple[float, bytes]]:
+    def version_1(sequence: int, request: Request) -> list[tuple[float, bytes]]:
         reply = stopped if isinstance(request, c.Stop) else c.Refused(request.OPCODE, c.Refusal.BAD_LENGTH)
         return [(0.001, frame_of(sequence, reply))]
 
@@ -79,7 +80,7 @@ def test_a_bridge_of_version_1_is_refused_in_one_line_and_can_be_stopped_all_the
 
 
 def test_gains_that_read_back_otherwise_are_reported() -> None:
-    def answers(request: c.Request) -> c.Reply:
+    def answers(request: Request) -> Reply:
         return c.GainsSet() if isinstance(request, c.SetGains) else c.Gains(((2, 0, 0),) * 6)
 
     with pytest.raises(GainsNotTakenError, match=r"joint 3: gains \(4, 1, 0\) written, \(2, 0, 0\) read back"):
@@ -89,7 +90,7 @@ def test_gains_that_read_back_otherwise_are_reported() -> None:
 def snapshots_of(snapshot: c.Snapshot) -> Controller:
     """A driver over a board that takes set points in tick 7, and always delivers the same period."""
     taken, stopped = c.SetPointsTaken(7, 0), c.Stopped(7, (505,) * 6)
-    replies: dict[type[c.Request], c.Reply] = {c.WriteSetPoints: taken, c.Sample: snapshot, c.Stop: stopped}
+    replies: dict[type[Request], Reply] = {c.WriteSetPoints: taken, c.Sample: snapshot, c.Stop: stopped}
     return controller_that(lambda request: replies.get(type(request)))
 
 
@@ -113,7 +114,7 @@ def test_only_set_points_in_force_can_be_missed() -> None:
 def test_only_a_greeting_after_a_reset_of_the_board_says_that_it_has_restarted() -> None:
     boots = iter([3, 3, 4])
 
-    def answer(sequence: int, request: c.Request) -> list[tuple[float, bytes]]:
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
         assert isinstance(request, c.Hello)
         return [
             (0.0, frame_of(sequence, c.HelloReply(2, c.Capability.SAMPLE, 20_000, 8, next(boots), request.nonce, 7)))
@@ -133,7 +134,7 @@ def test_a_board_that_restarted_is_told_by_the_first_status_or_refusal() -> None
     # A board without supply is told by the first status
     restarted = c.Status(7, c.StatusFlag.RESTARTED, 3, 0, 0)
     taken = c.SetPointsTaken(7, c.StatusFlag.RESTARTED)
-    replies: dict[type[c.Request], c.Reply] = {c.ReadStatus: restarted, c.WriteSetPoints: taken}
+    replies: dict[type[Request], Reply] = {c.ReadStatus: restarted, c.WriteSetPoints: taken}
     controller = controller_that(lambda request: replies.get(type(request)))
     with pytest.raises(ControllerRestartedError, match="gains are those of power-up"):
         controller.set_points({1: 500})
@@ -144,7 +145,7 @@ def test_a_board_that_restarted_is_told_by_the_first_status_or_refusal() -> None
         controller.next_snapshot(after=100)
 
     # What is refused since the board restarted is a restart and no refusal
-    def answers(request: c.Request, status: int) -> c.Reply:
+    def answers(request: Request, status: int) -> Reply:
         if isinstance(request, c.ReadStatus):
             return c.Status(7, status, 3, 0, 0)
         return c.Refused(request.OPCODE, c.Refusal.BAD_SESSION)
@@ -178,7 +179,7 @@ def test_a_sample_is_asked_for_with_set_points_and_joints_or_as_the_next() -> No
 def test_a_stop_is_timed_to_its_own_confirmation_and_its_set_points_are_due_a_period_later() -> None:
     hello = c.HelloReply(2, c.Capability.SAMPLE, 20_000, 8, 3, 0, 7)
 
-    def answer(sequence: int, request: c.Request) -> list[tuple[float, bytes]]:
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
         if isinstance(request, c.Hello):
             return [(0.0, frame_of(sequence, replace(hello, nonce=request.nonce)))]
         if isinstance(request, c.Stop):
@@ -230,7 +231,7 @@ def test_what_a_stop_s_confirmation_tells() -> None:
 def test_the_greeting_tells_the_link_how_long_a_sample_may_take() -> None:
     """A period of a second: the answer comes after 0.9 s, and is asked for once."""
 
-    def answer(sequence: int, request: c.Request) -> list[tuple[float, bytes]]:
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
         slow = c.HelloReply(2, c.Capability.SAMPLE, 1_000_000, 8, 3, 0, 7)
         shown = c.Snapshot(7, 0, ((1, JointReading(500, 2048, 0, 0)),))
         return [

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from daq.driver import Controller
 from daq.driver.double_read import MOST_READINGS, SETTLING_S, DoubleReader, Span, spans
 from daq.link import Link, LinkError, RequestRefusedError
-from firmware_protocol.commands import Block, ReadBlock, Refusal, Request
+from firmware_protocol.commands import Block, ReadBlock, Refusal
 from firmware_protocol.memory_map import MemoryMap, default_memory_map
+from firmware_protocol.message import Request
 from tests.control_port import told_by
 from tests.daq.driver.memory_board import PERIOD_S, MemoryBoard
 from tests.daq.link.scripted import ScriptedChannel, ScriptedEndpoint, frame_of

@@ -8,7 +8,8 @@ import pytest
 
 from daq.driver import BoardSnapshot, Controller, ControllerRestartedError
 from daq.link import LinkCounters, LinkLostError
-from firmware_protocol.commands import Reply, Request, Sample, Snapshot, StatusFlag
+from firmware_protocol.commands import Sample, Snapshot, StatusFlag
+from firmware_protocol.message import Reply, Request
 from firmware_protocol.units import posture_to_counts
 from tests.control_port import told_by
 

@@ -14,8 +14,9 @@ from daq.driver.sampling import Deliveries, MemorySampling, RingSampling
 from daq.driver.set_point_watch import SetPointWatch, Used
 from daq.link import LinkTimeoutError, RequestRefusedError
 from firmware_protocol import commands as c
-from firmware_protocol.commands import Reply, Request, SetPointsTaken, Status, StatusFlag, WriteSetPoints
-from firmware_protocol.joints import JointReading
+from firmware_protocol.commands import SetPointsTaken, Status, StatusFlag, WriteSetPoints
+from firmware_protocol.joints import CompactReading, JointReading
+from firmware_protocol.message import Reply, Request
 from firmware_protocol.units import counts_to_posture, posture_to_counts
 from tests.daq.link.scripted import says, scripted_link
 
@@ -134,7 +135,7 @@ def whole(tick: int, set_point: int = 500, status: int = 0) -> c.Snapshot:
 class Bench:
     """A sampling over a script; the clock is moved by hand, and by waiting for a period to come."""
 
-    def __init__(self, answers: Callable[[c.Request], c.Reply | None], bytes_per_second: float = FAST) -> None:
+    def __init__(self, answers: Callable[[Request], Reply | None], bytes_per_second: float = FAST) -> None:
         self.clock = HandClock()
 
         self.link, self.channel = scripted_link(says(answers))
@@ -145,7 +146,7 @@ class Bench:
         )
 
     @property
-    def asked(self) -> list[c.Request]:
+    def asked(self) -> list[Request]:
         return [request for _, request in self.channel.asked]
 
 
@@ -233,7 +234,7 @@ def test_a_reset_or_silent_board_has_no_sample() -> None:
 # ---- set points on their way
 
 
-def taken(tick: int, request: c.Request) -> c.Reply:
+def taken(tick: int, request: Request) -> Reply:
     """A board that took the set points in period `tick`, and shows the old ones in period 9."""
     return c.SetPointsTaken(tick, 0) if isinstance(request, c.WriteSetPoints) else whole(9)
 
@@ -246,7 +247,7 @@ def test_set_points_have_to_show_in_the_period_after_the_one_that_took_them(tick
 
 
 def compact(tick: int, taken_tick: int, status: int = 0) -> c.CompactSnapshot:
-    return c.CompactSnapshot(tick, status, taken_tick & 0xFF, ((1, c.CompactReading(2048, 0, 0)),))
+    return c.CompactSnapshot(tick, status, taken_tick & 0xFF, ((1, CompactReading(2048, 0, 0)),))
 
 
 @pytest.mark.parametrize(("tick", "missed"), [(299, True), (300, False)])

@@ -6,8 +6,10 @@ import pytest
 
 from daq.driver import Controller, ControllerRestartedError
 from daq.link import Link, RequestRefusedError
-from firmware_protocol.commands import Hello, Refusal, Release, Request, Stop, to_frame
+from firmware_protocol.commands import Hello, Refusal, Release, Stop
 from firmware_protocol.framing import Frame
+from firmware_protocol.message import Request
+from firmware_protocol.session import to_frame
 from mock_controller.bridge.bridge import Bridge
 from tests.mock.in_process import InProcess
 

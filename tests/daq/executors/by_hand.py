@@ -6,7 +6,7 @@ from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Future, ThreadPoolExecutor
 from typing import Any
 
-from daq.executors.workers import Workers
+from daq.executors.local import Workers
 
 
 class WorkersByHand(Workers):

@@ -5,8 +5,7 @@ from typing import Any
 
 import pytest
 
-from daq.executors.each import AHEAD, done_in_any_order
-from daq.executors.workers import ending
+from daq.executors.local import AHEAD, done_in_any_order, ending
 from tests.daq.executors.by_hand import WorkersByHand, square
 
 

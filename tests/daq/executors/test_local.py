@@ -7,7 +7,7 @@ from concurrent.futures import BrokenExecutor
 from pathlib import Path
 
 from daq.executors import LocalWorkers, done_in_any_order
-from daq.executors.workers import ending
+from daq.executors.local import ending
 from tests.daq.executors.by_hand import process_of, square, square_or_die
 
 ROOT = {"PYTHONPATH": str(Path(__file__).parents[3])}

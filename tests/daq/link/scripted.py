@@ -7,9 +7,10 @@ from random import Random
 
 from daq.link import Link
 from daq.transport import ChannelError, TransportError
-from firmware_protocol.commands import Reply, Request, parse_request, to_frame
 from firmware_protocol.dialect import IDLE_MARK
 from firmware_protocol.framing import FrameDecoder, encode_frame
+from firmware_protocol.message import Reply, Request
+from firmware_protocol.session import parse_request, to_frame
 
 
 def frame_of(sequence: int, reply: Reply) -> bytes:

@@ -16,11 +16,23 @@ from daq.link import Link, LinkTimeoutError, RequestRefusedError
 from daq.link.driver_board import DriverBoard
 from daq.link.driver_line import DriverLine
 from daq.transport import PortBusyError
-from firmware_protocol.codes import Capability, StatusFlag
-from firmware_protocol.commands import FineSetPoints, Hello, Release, SetPointsTaken, Snapshot, Stop, Stopped
+from firmware_protocol.commands import (
+    Capability,
+    ExplainedRefusal,
+    FineSetPoints,
+    Hello,
+    HelloReply,
+    Release,
+    Released,
+    ReportGains,
+    Sample,
+    SetPointsTaken,
+    Snapshot,
+    StatusFlag,
+    Stop,
+    Stopped,
+)
 from firmware_protocol.message import Reply, Request
-from firmware_protocol.replies import ExplainedRefusal, HelloReply, Released
-from firmware_protocol.requests import ReportGains, Sample
 
 FACTS = DriverFacts(
     joints=("pan", "tilt"),

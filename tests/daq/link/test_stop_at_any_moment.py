@@ -11,6 +11,8 @@ from daq.link import Link, StopCameFirstError
 from firmware_protocol import commands as c
 from firmware_protocol.framing import FrameDecoder
 from firmware_protocol.joints import JointReading
+from firmware_protocol.message import Request
+from firmware_protocol.session import parse_request
 from tests.daq.link.scripted import frame_of
 
 PATIENCE = 60.0
@@ -32,7 +34,7 @@ class SampleWaitsForStop:
 
     def __init__(self) -> None:
         self.sample_waits = threading.Event()
-        self.order: list[type[c.Request]] = []
+        self.order: list[type[Request]] = []
         self._decoder = FrameDecoder()
         self._sample: int | None = None
         self._replies: SimpleQueue[bytes] = SimpleQueue()
@@ -45,7 +47,7 @@ class SampleWaitsForStop:
 
     def write(self, data: bytes) -> None:
         for frame in self._decoder.feed(data):
-            request = c.parse_request(frame)
+            request = parse_request(frame)
             self.order.append(type(request))
             if isinstance(request, c.Sample):
                 self._sample = frame.sequence
@@ -94,7 +96,7 @@ def test_while_one_thread_reads_another_that_waits_does_not_read() -> None:
 
         def write(self, data: bytes) -> None:
             for frame in self._decoder.feed(data):
-                if isinstance(c.parse_request(frame), c.Sample):
+                if isinstance(parse_request(frame), c.Sample):
                     self._sample = frame.sequence
                     self.sample_waits.set()
                 elif self.confirmation is None:
@@ -160,7 +162,7 @@ def test_many_threads_share_one_link_and_each_gets_its_own_reply() -> None:
     class Echo(SampleWaitsForStop):
         def write(self, data: bytes) -> None:
             for frame in self._decoder.feed(data):
-                request = c.parse_request(frame)
+                request = parse_request(frame)
                 assert isinstance(request, c.Sample)
                 self._replies.put(frame_of(frame.sequence, c.Snapshot(request.after + 1, 0, SNAPSHOT.joints)))
 

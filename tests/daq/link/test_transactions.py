@@ -10,6 +10,7 @@ from daq.link.pending import SEQUENCE_NUMBERS, PendingReplies
 from daq.link.timing import HELLO_RETRIES, RETRIES
 from firmware_protocol import commands as c
 from firmware_protocol.joints import JointReading
+from firmware_protocol.message import Reply, Request
 from tests.daq.link.scripted import ScriptedChannel, ScriptedEndpoint, Zeros, frame_of, once_silent, says, scripted_link
 
 STATUS = c.Status(7, 0, 1, 0, 0)
@@ -17,7 +18,7 @@ TAKEN = c.SetPointsTaken(7, 0)
 SNAPSHOT = c.Snapshot(8, 0, ((1, JointReading(500, 2048, 0, 0)),))
 
 
-def right_reply(request: c.Request) -> c.Reply:
+def right_reply(request: Request) -> Reply:
     match request:
         case c.ReadBlock():
             return c.Block(request.address.to_bytes(2, "little") * (request.count // 2))
@@ -32,7 +33,7 @@ def right_reply(request: c.Request) -> c.Reply:
 def test_a_request_gets_its_reply_and_a_lost_reply_is_asked_for_under_the_same_number() -> None:
     seen: list[int] = []
 
-    def loses_the_first(sequence: int, request: c.Request) -> list[tuple[float, bytes]]:
+    def loses_the_first(sequence: int, request: Request) -> list[tuple[float, bytes]]:
         seen.append(sequence)
         return [(0.001, frame_of(sequence, STATUS))] if len(seen) > 1 else []
 
@@ -68,7 +69,7 @@ def test_the_budget_of_a_transaction_ends_in_one_line_and_outlasts_a_bridge_that
 def test_requests_written_together_cost_one_write_and_only_the_lost_one_is_repeated() -> None:
     lost = iter([True])
 
-    def answer(sequence: int, request: c.Request) -> list[tuple[float, bytes]]:
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
         if isinstance(request, c.WriteSetPoints) and next(lost, False):
             return []
         return [(0.002, frame_of(sequence, right_reply(request)))]
@@ -81,7 +82,7 @@ def test_requests_written_together_cost_one_write_and_only_the_lost_one_is_repea
 
 
 def test_a_reply_that_nobody_waits_for_is_dropped_and_counted() -> None:
-    def answer(sequence: int, request: c.Request) -> list[tuple[float, bytes]]:
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
         foreign = frame_of(sequence + 500, STATUS)
         wrong_kind = frame_of(sequence, TAKEN)
         right = frame_of(sequence, STATUS)
@@ -111,7 +112,7 @@ def test_a_refusal_says_which_request_and_why_and_is_counted_by_itself() -> None
 def test_round_trips_are_measured_where_it_is_known_which_copy_was_answered() -> None:
     delays = iter([0.004, 0.004, 0.500])  # the third comes after repetitions: not measured
 
-    def answer(sequence: int, request: c.Request) -> list[tuple[float, bytes]]:
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
         return [(next(delays, 0.004), frame_of(sequence, STATUS))]
 
     link, _ = scripted_link(answer)
@@ -153,7 +154,7 @@ def test_nothing_of_an_ended_channel_reaches_the_next() -> None:
     assert (len(first.asked), len(second.asked)) == (1, 1)
 
     # Half a reply is forgotten with the channel it came over
-    def breaks_off(sequence: int, _request: c.Request) -> list[tuple[float, bytes]]:
+    def breaks_off(sequence: int, _request: Request) -> list[tuple[float, bytes]]:
         if len(first.asked) > 1:
             first.broken = "cable pulled"
         return [(0.0, frame_of(sequence, STATUS)[:6])]
@@ -177,7 +178,7 @@ class _EndsAtTheWrite(ScriptedChannel):
 
 
 def test_a_reply_to_a_request_that_could_not_be_written_is_nobody_s() -> None:
-    def answers_an_older_request_too(sequence: int, _: c.Request) -> list[tuple[float, bytes]]:
+    def answers_an_older_request_too(sequence: int, _: Request) -> list[tuple[float, bytes]]:
         return [(0.0, frame_of(sequence - 1, STATUS) + frame_of(sequence, STATUS))]
 
     first = _EndsAtTheWrite(lambda _sequence, _request: [])
@@ -242,7 +243,7 @@ def test_a_greeting_is_answered_by_its_own_nonce_which_is_the_time_in_lock_step(
     assert greeted(replayed, short) is None
 
     # In lock step the nonce is the controller's time so that a run repeats to the bit
-    def answer(sequence: int, request: c.Request) -> list[tuple[float, bytes]]:
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
         if isinstance(request, c.Advance):
             return [(0.0, frame_of(sequence, c.Advanced(3 * 2**32 + 2**32 - 2, 0)))]
         assert isinstance(request, c.Hello)
@@ -312,7 +313,7 @@ def test_reconnection_waits_twice_as_long_each_time_and_may_be_given_up() -> Non
 def test_whatever_happens_to_replies_each_request_gets_its_own_or_none(fates: list[str], addresses: list[int]) -> None:
     script = iter(fates)
 
-    def answer(sequence: int, request: c.Request) -> list[tuple[float, bytes]]:
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
         reply = frame_of(sequence, right_reply(request))
         match next(script, "answer"):
             case "lose":

@@ -30,8 +30,10 @@ from daq.owner.stop_socket import StopAnswer, request_stop, stop_listener
 from daq.owner.watched_controller import WatchedController
 from daq.runner.arm_control import ArmControl
 from daq.safety import State
-from firmware_protocol.commands import ReadStatus, Release, Request, StatusFlag, Stop, to_frame
+from firmware_protocol.commands import ReadStatus, Release, StatusFlag, Stop
 from firmware_protocol.framing import Frame
+from firmware_protocol.message import Request
+from firmware_protocol.session import to_frame
 from mock_controller.bridge.bridge import Bridge
 from tests.mock.in_process import InProcess
 

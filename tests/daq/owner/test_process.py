@@ -18,7 +18,7 @@ from daq.driver import Controller
 from daq.link import LinkError
 from daq.owner import client, start
 from daq.owner.client import OwnerOnDemand
-from daq.owner.late_stop import deliver_late_stop
+from daq.owner.long_orders import deliver_late_stop
 from daq.owner.messages import REPORT, Answer, CannotOpen, EventHappened, Finished, HaltRun, Report, RunExperiment
 from daq.owner.stop_socket import request_stop
 from daq.traces.reader import read_trace

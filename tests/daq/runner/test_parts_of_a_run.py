@@ -13,13 +13,14 @@ from daq.contracts.machine import load_machine
 from daq.contracts.service.robot import LinkStatus, RobotIdentity
 from daq.driver import BoardSnapshot, Controller, StopConfirmation
 from daq.driver.line_rate import reported_rates
+from daq.owner.seen import rates_line, with_rates
 from daq.runner.arm_control import ArmControl, StoppedError, stop_line
 from daq.runner.lag import OLDEST_TO_ACT_ON, Lag
-from daq.runner.line_status import rates_line, with_rates
 from daq.runner.preparation import Consent
 from daq.runner.rows import RowMaker
 from daq.safety import Event, State
-from firmware_protocol.commands import JointReading, StatusFlag
+from firmware_protocol.commands import StatusFlag
+from firmware_protocol.joints import JointReading
 from tests.turned_arms import turned
 
 

@@ -14,7 +14,7 @@ from mcap.opcode import Opcode
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace_limits import TraceLimits
-from daq.traces import layout, set_points_taken
+from daq.traces import layout
 from daq.traces.catalogue import list_traces
 from daq.traces.fields import CompressedChunk
 from daq.traces.inflate import inflate
@@ -197,7 +197,7 @@ def test_a_value_that_no_rig_can_have_measured_is_refused(
 
 def test_a_record_of_a_slow_line_that_does_not_tell_each_sample_s_set_points_is_refused(tmp_path: Path) -> None:
     path = write(tmp_path / "a.mcap", every=2)
-    least = HEAD + 22 + set_points_taken.DTYPE.itemsize
+    least = HEAD + 22 + layout.TAKEN_DTYPE.itemsize
     left_out = 0
 
     def changed(chunk: bytes) -> bytes:

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from daq.contracts.errors import TraceError
@@ -103,20 +102,6 @@ def test_missing_samples_are_shaded_and_explained(trace: Trace, tmp_path: Path) 
     assert explained(figure_of(whole, (1,)).axes[0]) == ["set point", "position"]
 
 
-def test_panels_of_one_signal_span_as_much(trace: Trace) -> None:
-    axes = figure_of(trace).axes
-    position, error = [axis.get_ylim() for axis in axes[:3]], [axis.get_ylim() for axis in axes[3:6]]
-    assert [high - low for low, high in position] == pytest.approx([position[0][1] - position[0][0]] * 3)
-    assert trace.set_point is not None
-    for column, (low, high) in enumerate(position):
-        both = np.degrees(np.concatenate([trace.position[:, column], trace.set_point[:, column]]))
-        assert low < both.min() < both.max() < high
-        assert (low + high) / 2 == pytest.approx((both.min() + both.max()) / 2)
-    assert len(set(error)) == 1, "about zero, the same for all"
-    assert error[0][0] < 0.0
-    assert error[0][1] > np.degrees(0.03)
-
-
 def test_more_joints_than_fit_abreast_go_into_another_band(tmp_path: Path) -> None:
     with TraceWriter(tmp_path / "a.mcap", record(), (1, 2, 3, 4)) as writer:
         for tick in range(20):
@@ -151,11 +136,6 @@ def test_a_page_needs_nothing_else_and_escapes_what_people_wrote(small: Trace, t
     assert "<script" not in page
     assert 'src="' not in page
     assert "url(http" not in page
-
-
-@pytest.fixture(scope="module")
-def figure(trace: Trace) -> Figure:
-    return figure_of(trace)
 
 
 def test_speeds_and_lengths_have_rows_and_units_of_their_own(trace: Trace) -> None:

@@ -192,7 +192,7 @@ def foreign(metadata: dict[str, str] | None = None, schema: str = "other", encod
     writer.start()
     if metadata is not None:
         writer.add_metadata(layout.START_METADATA, metadata)
-    channel = writer.register_channel("/joint/1", encoding, writer.register_schema(schema, "jsonschema", b"{}"))
+    channel = writer.register_channel("/samples/joint_1", encoding, writer.register_schema(schema, "jsonschema", b"{}"))
     writer.add_message(channel, 1, b"{}", 1)
     writer.finish()  # type: ignore[no-untyped-call]
     return stream.getvalue()
@@ -211,7 +211,7 @@ def ours(**changes: object) -> dict[str, str]:
         (foreign(), "is an MCAP file, but not a trace: it has no metadata 'daq.record'"),
         (foreign(ours(format=TRACE_FORMAT + 1)), f"has format {TRACE_FORMAT + 1} of a newer version"),
         (foreign({"record": "{"}), "its metadata is not that of a trace"),
-        (foreign(ours()), "topic /joint/1 has schema 'other'"),
+        (foreign(ours()), "topic /samples/joint_1 has schema 'other'"),
         (foreign(ours(), layout.JOINT_SCHEMA, "cdr"), "a sample does not have 76 bytes"),
     ],
 )

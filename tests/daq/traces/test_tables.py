@@ -14,7 +14,7 @@ import xarray as xr
 from daq.contracts.errors import TraceError
 from daq.contracts.experiment import ExperimentSpec, Sine
 from daq.contracts.extras import MissingExtraError, require_extra
-from daq.contracts.figures import JointFigureSet
+from daq.contracts.service.traces import JointFigureSet
 from daq.contracts.trace import Trace
 from daq.traces.csv_table import INTEGRATED, import_csv
 from daq.traces.reader import read_trace

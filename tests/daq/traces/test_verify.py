@@ -13,7 +13,7 @@ from daq.contracts.errors import TraceError
 from daq.contracts.labels import Outcome
 from daq.contracts.trace import TraceEvent
 from daq.runner.recorder import Recorder
-from daq.traces import set_points_taken
+from daq.traces import layout
 from daq.traces.reader import read_trace
 from daq.traces.salvage import salvage
 from daq.traces.store import write_trace
@@ -193,7 +193,7 @@ def test_set_points_taken_read_back_and_a_fast_line_shows_them_itself(slow: Path
     path = write(tmp_path / "fast.mcap")
     assert read_trace(path).taken is None
     with path.open("rb") as stream:
-        assert set_points_taken.TOPIC not in {channel.topic for _, channel, _ in make_reader(stream).iter_messages()}
+        assert layout.SET_POINTS_TOPIC not in {channel.topic for _, channel, _ in make_reader(stream).iter_messages()}
 
 
 # ---- What is missing from a trace is counted in samples, by the trace as by the recorder that makes it.

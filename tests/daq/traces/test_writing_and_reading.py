@@ -1,7 +1,6 @@
 """What is recorded is what is read, here, with the official reader, and with a library of ROS 2."""
 
 import io
-import tracemalloc
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -270,29 +268,6 @@ def test_a_record_of_a_slow_line_tells_when_set_points_were_taken_and_is_of_ros_
     found = messages(tmp_path / "a.mcap")
     assert [(one.tick, one.taken) for one in found["/set_points"]] == [(0, 0), (4, 2), (8, 6)]
     assert [one.tick for one in found["/samples/joint_1"]] == [0, 4, 8]
-
-
-def test_the_index_of_a_long_record_takes_little_memory_and_leads_the_official_reader_to_each_chunk() -> None:
-    chunks, stream = 1500, io.BytesIO()
-    stream.write(bytes(1 << 20))
-    stream.seek(0)  # what the stream itself takes is not counted
-    tracemalloc.start()
-    recording = Recording(stream, record(), JOINTS, layout.RECORDED_SIGNALS, {})
-    before = tracemalloc.get_traced_memory()[0]
-    for tick in range(chunks):
-        recording.row(row(tick))
-        recording.flush()
-    taken = tracemalloc.get_traced_memory()[0] - before
-    tracemalloc.stop()
-    recording.finish("complete", {})
-    stream.truncate()
-    stream.seek(0)
-    assert taken < 100 * chunks
-    summary = make_reader(stream).get_summary()
-    assert summary is not None
-    assert len(summary.chunk_indexes) == chunks
-    assert all(stream.getbuffer()[one.chunk_start_offset] == Opcode.CHUNK for one in summary.chunk_indexes)
-    assert [one.sequence for _, channel, one in make_reader(stream).iter_messages("/joint_states")] == [*range(chunks)]
 
 
 def test_what_ros_2_prints_about_a_trace_is_what_the_page_says(tmp_path: Path) -> None:

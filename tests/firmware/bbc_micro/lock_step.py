@@ -15,6 +15,7 @@ from firmware_protocol import commands as c
 from firmware_protocol.dialect import IDLE_MARK
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.framing import Frame, FrameDecoder, encode_frame
+from firmware_protocol.session import parse_reply, parse_request, to_frame
 from mock_controller.bridge.pieces import PieceSplitter
 from tests.firmware.bbc_micro.built import machine
 from tests.firmware.bbc_micro.machine import BbcMicro
@@ -63,23 +64,23 @@ class LockStepBbc:
 
     def _advance(self, frame: Frame) -> Frame:
         try:
-            request = c.parse_request(frame)
+            request = parse_request(frame)
         except ProtocolError:
-            return c.to_frame(frame.sequence, c.Refused(frame.opcode, c.Refusal.BAD_LENGTH))
+            return to_frame(frame.sequence, c.Refused(frame.opcode, c.Refusal.BAD_LENGTH))
         assert isinstance(request, c.Advance)
         if frame.sequence != self._last_advance and request.microseconds:
             self.bbc.run_until(self.bbc.cycle + 2 * request.microseconds)
             self._last_advance = frame.sequence
-        return c.to_frame(frame.sequence, c.Advanced(self.bbc.time_us, self.bbc.variable("tick", 4)))
+        return to_frame(frame.sequence, c.Advanced(self.bbc.time_us, self.bbc.variable("tick", 4)))
 
     @staticmethod
     def _told(frame: Frame) -> Frame:
         if frame.opcode != c.HelloReply.OPCODE:
             return frame
-        reply = c.parse_reply(frame)
+        reply = parse_reply(frame)
         assert isinstance(reply, c.HelloReply)
         added = c.Capability.LOCK_STEP | c.Capability.SIMULATED
-        return c.to_frame(frame.sequence, replace(reply, capabilities=reply.capabilities | added))
+        return to_frame(frame.sequence, replace(reply, capabilities=reply.capabilities | added))
 
 
 def serve(port: int, name: str, seed: int) -> None:

@@ -12,6 +12,8 @@ needs.require()
 
 from firmware_protocol import commands as c  # noqa: E402
 from firmware_protocol.framing import Frame, FrameDecoder, encode_frame  # noqa: E402
+from firmware_protocol.message import Request, Stamp  # noqa: E402
+from firmware_protocol.session import UNSTAMPED, parse_reply, to_frame  # noqa: E402
 from firmware_protocol.units import counts_to_posture  # noqa: E402
 from tests.firmware.bbc_micro.built import board, images, machine  # noqa: E402
 from tests.firmware.bbc_micro.machine import BbcMicro  # noqa: E402
@@ -45,17 +47,17 @@ def asked(bbc: BbcMicro, line: bytes, wait_us: int = 40_000) -> tuple[list[Frame
     return frames, took
 
 
-def working_time(bbc: BbcMicro, request: c.Request, stamp: c.Stamp = c.UNSTAMPED) -> int:
+def working_time(bbc: BbcMicro, request: Request, stamp: Stamp = UNSTAMPED) -> int:
     """Time (µs) from the last byte of a request to the first byte of its reply on the line."""
-    (reply,), took = asked(bbc, encode_frame(c.to_frame(7, request, stamp)))
+    (reply,), took = asked(bbc, encode_frame(to_frame(7, request, stamp)))
     return took - len(encode_frame(reply)) * bbc.serial.byte_cycles // 2
 
 
 def test_it_says_what_it_is_and_starts_frozen(bbc: BbcMicro) -> None:
     assert bbc.screen.startswith("\x16\x07MA2000 bridge, protocol 2, 19200 baud")
     assert bbc.serial.baud == 19200
-    (reply,), _ = asked(bbc, encode_frame(c.to_frame(1, c.ReadStatus())))
-    status = c.parse_reply(reply)
+    (reply,), _ = asked(bbc, encode_frame(to_frame(1, c.ReadStatus())))
+    status = parse_reply(reply)
     assert isinstance(status, c.Status)
     assert status.status == c.StatusFlag.FROZEN | c.StatusFlag.RESTARTED
     assert status.stop != 0
@@ -65,7 +67,7 @@ def test_it_says_what_it_is_and_starts_frozen(bbc: BbcMicro) -> None:
     "vector", [v for v in VECTORS["damaged"] if v["why"] != "no closing delimiter"], ids=lambda v: v["why"]
 )
 def test_damaged_lines_are_not_answered(bbc: BbcMicro, vector: dict[str, str]) -> None:
-    frames, _ = asked(bbc, bytes.fromhex(vector["line"]) + b"\0" + encode_frame(c.to_frame(9, c.ReadStatus())), 30_000)
+    frames, _ = asked(bbc, bytes.fromhex(vector["line"]) + b"\0" + encode_frame(to_frame(9, c.ReadStatus())), 30_000)
     assert [(frame.sequence, frame.opcode) for frame in frames] == [(9, c.Status.OPCODE)]
 
 
@@ -74,7 +76,7 @@ def test_damaged_lines_are_not_answered(bbc: BbcMicro, vector: dict[str, str]) -
 )
 def test_wrong_requests_are_refused_for_the_right_reason(bbc: BbcMicro, vector: dict[str, Any]) -> None:
     (frame,), _ = asked(bbc, encode_frame(Frame(3, vector["opcode"], bytes.fromhex(vector["payload"]))))
-    assert c.parse_reply(frame) == c.Refused(vector["opcode"], c.Refusal[vector["reason"]])
+    assert parse_reply(frame) == c.Refused(vector["opcode"], c.Refusal[vector["reason"]])
 
 
 def test_counts_become_posture_units_by_the_rounding_rule() -> None:
@@ -101,7 +103,7 @@ def test_counts_become_posture_units_by_the_rounding_rule() -> None:
     ],
     ids=lambda request: type(request).__name__,
 )
-def test_a_request_is_answered_within_5_ms(bbc: BbcMicro, request_: c.Request) -> None:
+def test_a_request_is_answered_within_5_ms(bbc: BbcMicro, request_: Request) -> None:
     assert working_time(bbc, request_) <= ANSWER_US
 
 
@@ -114,7 +116,7 @@ def test_a_stop_in_force_is_answered_within_10_ms_while_the_phase_is_unknown() -
 
 
 def test_frames_of_the_largest_size_one_after_the_other_lose_no_byte(bbc: BbcMicro) -> None:
-    longest = encode_frame(c.to_frame(1, c.WriteBlock(0xFC00, bytes(range(1, 39)))))
+    longest = encode_frame(to_frame(1, c.WriteBlock(0xFC00, bytes(range(1, 39)))))
     bbc.serial.sent.clear()
     arrived = bbc.serial.host_sends(longest * 8)
     bbc.run_until(arrived + 2 * 100_000)

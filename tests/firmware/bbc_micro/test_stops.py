@@ -13,6 +13,8 @@ needs.require()
 from firmware_protocol import commands as c  # noqa: E402
 from firmware_protocol.framing import FrameDecoder, encode_frame  # noqa: E402
 from firmware_protocol.memory_map import default_memory_map  # noqa: E402
+from firmware_protocol.message import Request, Stamp  # noqa: E402
+from firmware_protocol.session import parse_reply, to_frame  # noqa: E402
 from firmware_protocol.units import counts_to_posture  # noqa: E402
 from tests.firmware.bbc_micro.built import machine  # noqa: E402
 
@@ -34,10 +36,10 @@ class Host:
     def __init__(self) -> None:
         self.bbc = machine()
         self._sequence = 0
-        self._stamp = c.Stamp(0, 0)
+        self._stamp = Stamp(0, 0)
         self.took_us = 0
         self.run(60_000)
-        self._stamp = c.Stamp(self.ask(c.Hello(c.PROTOCOL_VERSION, 77)).session, 0)
+        self._stamp = Stamp(self.ask(c.Hello(c.PROTOCOL_VERSION, 77)).session, 0)
         self.release()
         self.run(5 * PERIOD_US)
 
@@ -45,14 +47,14 @@ class Host:
         """Lets time pass."""
         self.bbc.run_until(self.bbc.cycle + 2 * us)
 
-    def ask(self, request: c.Request) -> Any:
+    def ask(self, request: Request) -> Any:
         """The reply; its first byte is on the line `took_us` after the request's last."""
         bbc = self.bbc
         self._sequence += 1
         if request.IS_COMMAND:
-            self._stamp = c.Stamp(self._stamp.session, self._stamp.number + 1)
+            self._stamp = Stamp(self._stamp.session, self._stamp.number + 1)
         bbc.serial.sent.clear()
-        arrived = bbc.serial.host_sends(encode_frame(c.to_frame(self._sequence, request, self._stamp)))
+        arrived = bbc.serial.host_sends(encode_frame(to_frame(self._sequence, request, self._stamp)))
         decoder = FrameDecoder()
         while bbc.cycle < arrived + 2 * 100_000:
             self.run(200)
@@ -60,7 +62,7 @@ class Host:
                 at, byte = bbc.serial.sent.popleft()
                 for frame in decoder.feed(bytes((byte,))):
                     self.took_us = (at - arrived - len(encode_frame(frame)) * bbc.serial.byte_cycles) // 2
-                    return c.parse_reply(frame)
+                    return parse_reply(frame)
         raise AssertionError(f"no reply to {request}")
 
     def release(self) -> None:

@@ -8,6 +8,9 @@ import pytest
 from firmware_protocol import commands as c
 from firmware_protocol.commands import AFTER_NEWEST, Sample, Snapshot, Stop, Stopped
 from firmware_protocol.framing import Frame, encode_frame
+from firmware_protocol.joints import ALL_JOINTS
+from firmware_protocol.message import Request
+from firmware_protocol.session import parse_reply, to_frame
 from firmware_protocol.units import counts_to_posture
 from mock_controller.board.parameters import default_board_text
 from mock_controller.bridge.bridge import WAIT_LIMIT_PERIODS, Bridge
@@ -47,10 +50,10 @@ def test_no_session_and_no_stop_has_the_number_0(host: LockStepHost, first_numbe
     bridge = Bridge(Timeline(host.board, host.device.faults), first_number=first_number)
     numbers = set()
     for nonce in range(3):
-        reply = c.parse_reply(bridge.receive(c.to_frame(0, c.Hello(2, nonce)))[0])
+        reply = parse_reply(bridge.receive(to_frame(0, c.Hello(2, nonce)))[0])
         assert isinstance(reply, c.HelloReply)
-        bridge.receive(c.to_frame(0, c.Stop()))
-        status = c.parse_reply(bridge.receive(c.to_frame(0, c.ReadStatus()))[0])
+        bridge.receive(to_frame(0, c.Stop()))
+        status = parse_reply(bridge.receive(to_frame(0, c.ReadStatus()))[0])
         assert isinstance(status, c.Status)
         numbers |= {reply.session, status.stop}
     assert len(numbers) == 6
@@ -58,7 +61,7 @@ def test_no_session_and_no_stop_has_the_number_0(host: LockStepHost, first_numbe
 
 
 @pytest.mark.parametrize("request_", [c.ReadBlock(0xFBFF, 1), c.ReadBlock(0xFC7F, 2), c.WriteBlock(0xFC7F, b"ab")])
-def test_memory_ends_where_the_map_says(host: LockStepHost, request_: c.Request) -> None:
+def test_memory_ends_where_the_map_says(host: LockStepHost, request_: Request) -> None:
     before = host.board.time_us
     assert refusal(host.ask(request_)) is c.Refusal.BAD_ADDRESS
     assert host.board.time_us == before
@@ -72,7 +75,7 @@ def test_set_points_gains_and_bytes_are_in_the_memory(host: LockStepHost) -> Non
     taken = host.ask(c.WriteSetPoints(((1, 520), (3, 480))))
     assert isinstance(taken, c.SetPointsTaken)
     assert host.board.memory.values("set_point")[0:3:2] == [520, 480]
-    snapshot = host.ask(c.Sample(taken.tick, c.ALL_JOINTS))
+    snapshot = host.ask(c.Sample(taken.tick, ALL_JOINTS))
     assert isinstance(snapshot, c.Snapshot)
     readings = dict(snapshot.joints)
     assert snapshot.tick == taken.tick + 1
@@ -165,7 +168,7 @@ def busy(sample: bool, seed: int) -> LockStepHost:
     host, dice = LockStepHost(sample=sample, seed=seed), Random(seed)
     for _ in range(400):
         host.ask(c.Advance(dice.randrange(3000)))
-        accesses: list[c.Request] = [
+        accesses: list[Request] = [
             c.WriteSetPoints(SIX),
             c.ReadBlock(0xFC00, 48),
             c.WriteBlock(0xFC74, b"12345678"),

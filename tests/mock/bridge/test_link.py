@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from firmware_protocol import commands as c
 from firmware_protocol.dialect import IDLE_MARK
+from firmware_protocol.message import Request
 from mock_controller.bridge.pieces import LONGEST, Line, PieceSplitter
 from mock_controller.pace import HOST_PATIENCE_US
 from tests.mock.host import LockStepHost, RealTimeHost
@@ -98,7 +99,7 @@ def test_a_turn_is_a_piece_whose_request_may_be_lost_and_is_waited_for() -> None
 @settings(max_examples=12, deadline=None)
 @given(st.lists(st.integers(0, 200), max_size=10))
 def test_what_is_said_does_not_depend_on_how_the_bytes_were_cut(cuts: list[int]) -> None:
-    requests: list[c.Request] = [
+    requests: list[Request] = [
         c.Hello(2, 5),
         c.WriteSetPoints(((1, 510),)),
         c.Sample(c.AFTER_NEWEST, 7),

@@ -9,6 +9,8 @@ from daq.driver import Controller
 from daq.link import Link
 from firmware_protocol import commands as c
 from firmware_protocol.framing import Frame
+from firmware_protocol.message import Reply, Request, Stamp
+from firmware_protocol.session import parse_reply, to_frame
 from mock_controller.bridge.bridge import Bridge
 from mock_controller.bridge.routines import MemoryRoutines
 from tests.contract.untorn_stop import NEAR, frozen_far_away
@@ -34,14 +36,14 @@ class Conversation(RuleBasedStateMachine):
         self.recorded: list[tuple[Frame, bool]] = []
         """Frames, and whether each may still be obeyed: of the present session, and none after it."""
 
-    def ask(self, request: c.Request, sequence: int, stamp: c.Stamp) -> c.Reply:
-        frame = c.to_frame(sequence, request, stamp)
+    def ask(self, request: Request, sequence: int, stamp: Stamp) -> Reply:
+        frame = to_frame(sequence, request, stamp)
         (answer,) = self.device.bridge.receive(frame)
         assert answer.sequence == sequence
         self.recorded.append((frame, False))
-        return c.parse_reply(answer)
+        return parse_reply(answer)
 
-    def expected(self, stamp: c.Stamp) -> c.Refusal | None:
+    def expected(self, stamp: Stamp) -> c.Refusal | None:
         if self.session == 0 or stamp.session != self.session:
             return c.Refusal.BAD_SESSION
         if stamp.number < self.newest:
@@ -51,7 +53,7 @@ class Conversation(RuleBasedStateMachine):
 
     @rule(sequence=SEQUENCES, number=NUMBERS, posture=st.integers(0, 999), foreign=st.booleans())
     def write(self, sequence: int, number: int, posture: int, foreign: bool) -> None:
-        stamp = c.Stamp(self.session + foreign, number)
+        stamp = Stamp(self.session + foreign, number)
         refusal = self.expected(stamp)
         reply = self.ask(c.WriteSetPoints(((2, posture),)), sequence, stamp)
         if refusal is None and self.frozen:
@@ -64,7 +66,7 @@ class Conversation(RuleBasedStateMachine):
 
     @rule(sequence=SEQUENCES)
     def stop(self, sequence: int) -> None:
-        reply = self.ask(c.Stop(), sequence, c.Stamp(0, 0))
+        reply = self.ask(c.Stop(), sequence, Stamp(0, 0))
         assert isinstance(reply, c.Stopped)
         if self.frozen:
             assert reply.postures[1] == self.set_point
@@ -75,7 +77,7 @@ class Conversation(RuleBasedStateMachine):
 
     @rule(sequence=SEQUENCES, number=NUMBERS, other=st.booleans())
     def release(self, sequence: int, number: int, other: bool) -> None:
-        stamp = c.Stamp(self.session, number)
+        stamp = Stamp(self.session, number)
         refusal = self.expected(stamp) or (c.Refusal.OTHER_STOP if other else None)
         reply = self.ask(c.Release(self.stop_number ^ other), sequence, stamp)
         assert reply == (c.Released() if refusal is None else c.Refused(c.Release.OPCODE, refusal))
@@ -83,7 +85,7 @@ class Conversation(RuleBasedStateMachine):
 
     @rule(sequence=SEQUENCES, nonce=st.integers(0, 3))
     def hello(self, sequence: int, nonce: int) -> None:
-        reply = self.ask(c.Hello(c.PROTOCOL_VERSION, nonce), sequence, c.Stamp(0, 0))
+        reply = self.ask(c.Hello(c.PROTOCOL_VERSION, nonce), sequence, Stamp(0, 0))
         assert isinstance(reply, c.HelloReply)
         assert reply.nonce == nonce
         if self.session and nonce == self.nonce:
@@ -106,19 +108,19 @@ class Conversation(RuleBasedStateMachine):
         frame, _ = data.draw(st.sampled_from(self.recorded))
         if frame.opcode in (c.Hello.OPCODE, c.Stop.OPCODE):
             return
-        stamp = c.Stamp.parse(frame.payload)
+        stamp = Stamp.parse(frame.payload)
         self.expected(stamp)
         (answer,) = self.device.bridge.receive(frame)
-        if stamp != c.Stamp(self.session, self.newest):
-            assert isinstance(c.parse_reply(answer), c.Refused)
+        if stamp != Stamp(self.session, self.newest):
+            assert isinstance(parse_reply(answer), c.Refused)
         elif frame.opcode == c.WriteSetPoints.OPCODE and not self.frozen:
             self.set_point = int.from_bytes(frame.payload[9:11], "little")
         elif frame.opcode == c.Release.OPCODE and frame.payload[8:] == self.stop_number.to_bytes(4, "little"):
             self.frozen = False
 
     def status(self) -> c.Status:
-        (answer,) = self.device.bridge.receive(c.to_frame(0, c.ReadStatus()))
-        reply = c.parse_reply(answer)
+        (answer,) = self.device.bridge.receive(to_frame(0, c.ReadStatus()))
+        reply = parse_reply(answer)
         assert isinstance(reply, c.Status)
         return reply
 

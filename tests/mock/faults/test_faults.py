@@ -7,18 +7,9 @@ from statistics import pstdev
 
 import pytest
 
-from firmware_protocol.commands import (
-    ALL_JOINTS,
-    Advance,
-    Hello,
-    JointReading,
-    ReadStatus,
-    Sample,
-    Snapshot,
-    Status,
-    StatusFlag,
-)
+from firmware_protocol.commands import Advance, Hello, ReadStatus, Sample, Snapshot, Status, StatusFlag
 from firmware_protocol.commands import WriteSetPoints as Write
+from firmware_protocol.joints import ALL_JOINTS, JointReading
 from mock_controller.faults.fault import FaultError, fields_of
 from mock_controller.faults.registry import FAULTS, describe, parse_fault, table
 from tests.mock.host import LockStepHost, RealTimeHost, make_device

@@ -13,11 +13,13 @@ from mock_controller.board import default_board
 from mock_controller.hidden.arm import LOAD_KG, HiddenArm, Kind, Load, SecretError, compose_seed, draw_arm
 from mock_controller.hidden.sizes import LATER_SIZES, OPEN_SIZES, SHARED_SIZES, SizeRange, draw_values
 from mock_controller.hidden.tolerances import tolerances
-from mock_controller.modifications.registry import OPEN_SET, SHARED, build_modification
+from mock_controller.modifications.registry import build_modification, is_shared, known_modifications
 from mock_controller.plant import Plant, default_plant
 from tests.mock.host import make_device
 
 SIZES = SHARED_SIZES + LATER_SIZES + OPEN_SIZES
+SHARED = {name for name in known_modifications() if is_shared(name)}
+OPEN_SET = set(known_modifications()) - SHARED
 CAME_LATER = {"quadratic_drag"}
 """Effects that came to the library after they had been drawn as none of it, and keep their draws."""
 
@@ -27,8 +29,8 @@ def arms(kind: Kind, count: int = 60) -> list[HiddenArm]:
 
 
 def test_every_effect_and_every_arm_can_be_drawn() -> None:
-    assert {size.effect for size in SHARED_SIZES + LATER_SIZES} == {kind.name for kind in SHARED} - CAME_LATER
-    assert {size.effect for size in OPEN_SIZES} == {kind.name for kind in OPEN_SET} | CAME_LATER
+    assert {size.effect for size in SHARED_SIZES + LATER_SIZES} == SHARED - CAME_LATER
+    assert {size.effect for size in OPEN_SIZES} == OPEN_SET | CAME_LATER
     assert len(SIZES) == len({size.effect for size in SIZES})
     for kind in Kind:
         for load in Load:
@@ -56,7 +58,7 @@ def test_sizes_from_end_to_end_are_allowed_and_can_be_built(size: SizeRange) -> 
 
 
 def test_kinds_are_what_they_say() -> None:
-    shared, unknown = {kind.name for kind in SHARED}, {kind.name for kind in OPEN_SET} | CAME_LATER
+    shared, unknown = SHARED, OPEN_SET | CAME_LATER
     assert all(arm.effects == () for arm in arms(Kind.CLEAN))
     assert all(len(arm.effects) == 1 and arm.effects[0].name in shared for arm in arms(Kind.SINGLE))
     assert all(len(arm.effects[0].joints) <= 1 for arm in arms(Kind.SINGLE))

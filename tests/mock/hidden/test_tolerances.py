@@ -27,7 +27,7 @@ from mock_controller.hidden.tolerances import (
     harmonic_deviation,
     tolerances,
 )
-from mock_controller.modifications.registry import LIBRARY
+from mock_controller.modifications.registry import known_modifications
 from mock_controller.options import OptionsError, read_options
 from mock_controller.plant import default_plant
 from tests.mock.host import LockStepHost, make_device
@@ -182,7 +182,7 @@ def give_aways(seed: int) -> list[str]:
     numbers = [value for effect in arm.effects for values in effect.parameters for value in values.values()]
     numbers += [*arm.deviations.values(), *(1 + value for value in arm.deviations.values())]
     telling = [repr(value)[:9] for value in numbers if isinstance(value, float) and len(repr(value)) > 8]
-    return [kind.name for kind in LIBRARY] + [arm.kind.name.lower() + '"', *telling]
+    return [*known_modifications(), arm.kind.name.lower() + '"', *telling]
 
 
 @pytest.mark.parametrize("kind", list(Kind))

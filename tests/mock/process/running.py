@@ -9,8 +9,8 @@ from typing import Any, Self
 
 import serial
 
-from firmware_protocol.commands import Reply, Request
 from firmware_protocol.dialect import FramedDialect
+from firmware_protocol.message import Reply, Request
 from tests.control_port import told_by
 
 ROOT = Path(__file__).parents[3]

@@ -9,6 +9,7 @@ import pytest
 import serial
 
 from firmware_protocol import commands as c
+from firmware_protocol.message import Request
 from tests.mock.process.running import RunningMock, SerialHost
 
 WHERE = pytest.mark.parametrize("where", [("--pty",), ("--tcp", "127.0.0.1:0")], ids=["pty", "tcp"])
@@ -38,7 +39,7 @@ def test_lock_step_repeats_to_the_bit_from_one_process_to_the_next(where: tuple[
     faults = ("--fault", "flip:rate=0.1,seed=1", "--fault", "drop:rate=0.05", "--fault", "junk:rate=0.1")
 
     def everything_said() -> list[bytes]:
-        requests: list[c.Request] = [c.Hello(2, 1)]
+        requests: list[Request] = [c.Hello(2, 1)]
         for posture in range(500, 540):
             requests += [c.WriteSetPoints(((1, posture), (2, 333))), c.Sample(c.AFTER_NEWEST, 63)]
         with RunningMock(*where, "--lock-step", "--seed", "7", *faults) as mock, SerialHost(mock.url) as host:

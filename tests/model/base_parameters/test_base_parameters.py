@@ -1,13 +1,12 @@
 """Base parameters: the textbook's groupings, Pinocchio's regressor, published counts, and what records tell."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from daq.contracts.experiment import ExperimentSpec, Multisine
 from daq.contracts.machine import load_machine
-from mock_controller.servos.bench import Options
 from model.arrays import Floats
 from model.base_parameters.base_parameters import base_parameters, regressor
 from model.base_parameters.grouping import grouped
@@ -26,7 +25,6 @@ from model.inverse_dynamics.fit import fit_torques
 from model.kinematics.chain import Chain, Joint
 from model.machine_model.model import base_model
 from model.simulation.chain_of_model import chain_of
-from tests.daq.servo_bench import recorded as recorded_on_bench
 from tests.model.dynamics.chains import random_chain, random_link
 from tests.model.inverse_dynamics.test_fit_torques import COULOMB, LENGTH, MASS, ROTOR, VISCOUS, rod, swinging
 
@@ -146,12 +144,14 @@ def test_a_motor_other_than_the_files_is_judged_as_one_that_the_file_states(tmp_
     assert found.residual != pytest.approx(as_file.residual, rel=0.1)
 
 
-def test_a_record_of_one_joint_does_not_tell_the_others(tmp_path: Path) -> None:
+def test_a_record_of_one_joint_does_not_tell_the_others() -> None:
     machine = load_machine(str(EXAMPLES / "pan_tilt.toml"))
-    tones = Multisine(amplitude={2: 0.2}, duration=4.0, lowest=0.2, highest=1.5, tones=8, seed=1)
-    spec = ExperimentSpec(trajectory=tones, joints=(2,), settle=0.3, hold=0.3)
-    one = recorded_on_bench(Options(torque=True), spec, tmp_path)
-    told = base_parameters(base_model(machine), [one])
+    one = swinging(1)
+    still, tilt = np.full(len(one), np.pi), one.position[:, 0] + 2.4
+    assert one.drive is not None
+    angles, drives = np.stack([still, tilt], axis=1), np.insert(one.drive, 0, 0.0, axis=1)
+    two = replace(one, joints=(1, 2), position=angles, set_point=angles, velocity=None, drive=drives)
+    told = base_parameters(base_model(machine), [two])
     verdicts = dict(zip((p.text for p in told.parameters), told.excitation.parameters, strict=True))
     assert not verdicts["Fc_1"].told
     assert told.excitation.told < len(told.parameters)

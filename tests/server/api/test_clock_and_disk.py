@@ -253,24 +253,6 @@ def test_a_folder_of_traces_that_is_away_is_told_and_takes_no_experiment(api: ht
     assert api.get("queue/experiments").json() == []
 
 
-def test_a_calibration_is_checked_and_queued_as_any_experiment(
-    api: httpx.Client, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def asked(**options: Any) -> httpx.Response:
-        return api.post("calibrations/gain", **({"json": {"joints": [1]}} | options))
-
-    refused = asked(json={"joints": [9]})
-    assert refused.status_code == 422, refused.text
-    first = asked(headers={"Idempotency-Key": "1"})
-    assert first.status_code == 201, first.text
-    assert first.headers["Location"].endswith(f"/experiments/{first.json()['id']}")
-    again = asked(headers={"Idempotency-Key": "1"})
-    assert (again.status_code, again.json()["id"]) == (200, first.json()["id"])
-    monkeypatch.setattr(shutil, "disk_usage", _full)
-    assert asked().json()["type"] == "/api/v1/problems#no-room"
-    assert [one["id"] for one in api.get("queue/experiments").json()] == [first.json()["id"]]
-
-
 def test_the_size_of_the_database_counts_what_was_written_last(api: httpx.Client, tmp_path: Path) -> None:
     for _ in range(20):
         api.post("/experiments", json={}).raise_for_status()  # SQLite writes them to its log first

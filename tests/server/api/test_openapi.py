@@ -15,7 +15,6 @@ import jsonschema_rs  # schemathesis's own: an opinion that is independent of py
 import pytest
 
 import hatch_build
-from server.api import description
 from server.api.documented import PROBLEM_EXAMPLES
 from server.app import bare_app
 from server.clock import SystemClock
@@ -26,29 +25,6 @@ from tests.server.service import running_service
 @pytest.fixture(scope="module")
 def described() -> dict[str, Any]:
     return bare_app(None).openapi()
-
-
-def _operations(described: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
-    return [
-        (f"{method.upper()} {path}", operation)
-        for path, methods in described["paths"].items()
-        for method, operation in methods.items()
-    ]
-
-
-def test_operations_have_names_of_their_own_that_are_functions(described: dict[str, Any]) -> None:
-    names = [operation["operationId"] for _, operation in _operations(described)]
-    assert len(names) == len(set(names))
-    assert all(name.isidentifier() and name.islower() for name in names)
-
-
-def test_every_operation_says_what_it_does_and_what_it_answers(described: dict[str, Any]) -> None:
-    for name, operation in _operations(described):
-        assert operation.get("description"), name
-        good = [answer for status, answer in operation["responses"].items() if status.startswith("2")]
-        assert good, name
-        if "204" not in operation["responses"]:
-            assert any("content" in answer for answer in good), name
 
 
 def test_everything_of_a_robot_names_it(described: dict[str, Any]) -> None:
@@ -95,22 +71,6 @@ def test_no_request_waits_while_the_api_description_is_built() -> None:
 
     assert [answer.json() for answer in asyncio.run(three())] == [{"openapi": "3.1.0"}] * 3
     assert times == 1
-
-
-def test_a_description_that_failed_is_made_again() -> None:
-    app = bare_app(None)
-    answers = iter([MemoryError(), {}])
-
-    def once_without_memory() -> dict[str, Any]:
-        answer = next(answers)
-        if isinstance(answer, Exception):
-            raise answer
-        return answer
-
-    app.openapi = once_without_memory  # type: ignore[method-assign]
-    making = description.Described(app)
-    assert isinstance(making.begin().exception(60), MemoryError)
-    assert [making.begin().result(60) for _ in range(2)] == [b"{}", b"{}"]
 
 
 CHECKS = "status_code_conformance,content_type_conformance,response_schema_conformance"

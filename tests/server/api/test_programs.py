@@ -15,7 +15,6 @@ from server.store.engine import Store
 from server.store.programs import MOST_PROGRAMS, ProgramStore
 from tests.daq_cli.invoke import CommandLine
 from tests.server.clocks import HandClock
-from tests.server.polling import until
 from tests.server.service import Service
 
 ROBOT = "ma2000"
@@ -115,21 +114,11 @@ def _body(program: Program) -> dict[str, Any]:
     return body
 
 
-def test_a_program_is_kept_without_the_control_and_carried_out_with_it(empty: Service) -> None:
+def test_a_program_is_kept_without_the_control(empty: Service) -> None:
     waits = Program(name="waits", instructions=(Wait(duration=0.1),))
     kept = empty.robot.put("/programs/waits", json=_body(waits))
     assert kept.status_code == 200, kept.text
     assert empty.robot.get("/programs/waits").json() == {"entry": kept.json(), "program": _body(waits)}
-    assert empty.robot.post("/programs/waits/run").json()["type"].endswith("#control-needed")
-    empty.until_connected()
-    lease = empty.robot.post("/control", json={}).json()["lease"]
-    headers = {"Control-Lease": lease}
-    assert empty.robot.post("/programs/nothing/run", headers=headers).status_code == 404
-    assert empty.robot.post("/programs/waits/run", headers=headers).status_code == 202
-    status = until(empty.robot, "/teaching", lambda teaching: teaching["activity"] == "none")
-    assert status["problem"] == ""
-    assert status["result"] == "done: 1 instructions"
-    empty.robot.delete("/control", headers=headers)
     assert [one["name"] for one in empty.robot.get("/programs").json()] == ["waits"]
 
 

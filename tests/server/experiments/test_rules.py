@@ -279,15 +279,6 @@ def test_a_cron_run_at_the_very_start_counts_and_missed_ones_are_left_out() -> N
     assert following(plan, 1, begun, begun - timedelta(days=9)) == begun + timedelta(days=1), "the clock is set back"
 
 
-def test_a_day_of_the_month_and_a_weekday_are_alternatives() -> None:
-    """As POSIX has it."""
-    plan = Plan(datetime(2026, 6, 1, tzinfo=UTC), 0.0, None, "0 2 1-3 * 1", "UTC")
-    runs = [first(plan)]
-    while len(runs) < 5 and runs[-1] is not None:
-        runs.append(following(plan, len(runs), runs[-1], runs[-1]))
-    assert [run.day for run in runs if run is not None] == [1, 2, 3, 8, 15]  # 8 and 15 June 2026 are Mondays
-
-
 @pytest.mark.parametrize(
     ("cron", "zone", "field"),
     [

@@ -5,7 +5,7 @@ from datetime import timedelta
 from pathlib import Path
 
 import pytest
-from sqlalchemy import event, text
+from sqlalchemy import text
 
 from daq.config.service import ServiceSettings
 from daq.contracts.errors import SpecError
@@ -115,24 +115,6 @@ def test_what_ended_last_comes_first_whenever_it_was_submitted(store: Store) -> 
     found = [one.id for one in (*first.items, *rest.items)]
     assert (set(found[:2]), set(found[2:])) == ({made[4], made[1]}, {made[2], made[0]})
     assert rest.next is None
-
-
-def test_a_page_that_many_ask_for_is_read_once_until_something_is_written(store: Store) -> None:
-    experiments, traces, sent = ExperimentStore(store), TraceStore(store), []
-    experiments.submit("ma2000", ExperimentRequest(), NOW, "anna")
-    traces.insert("ma2000", new_trace(1))
-    event.listen(store.engine, "before_cursor_execute", lambda *told: sent.append(told[2]))
-
-    def listed() -> tuple[int, int, int]:
-        before = len(sent)
-        counts = len(experiments.page("ma2000", (), None, None, 5).items), len(_found(traces))
-        return *counts, len(sent) - before
-
-    assert listed()[:2] == (1, 1)
-    assert listed() == (1, 1, 0)
-    experiments.submit("ma2000", ExperimentRequest(), NOW, "bert")
-    traces.remove("ma2000", f"{1:012x}")
-    assert listed()[:2] == (2, 0)
 
 
 def test_pages_leave_nothing_out_and_double_nothing_while_rows_come(store: Store) -> None:

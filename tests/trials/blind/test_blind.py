@@ -16,7 +16,7 @@ from mcap.stream_reader import StreamReader
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec, Ramp
 from daq.contracts.machine import load_machine
-from daq.executors.workers import ending
+from daq.executors.local import ending
 from daq.traces.reader import read_trace
 from model.discrepancy.diagnosis import Diagnosis
 from model.machine_model.model import base_model

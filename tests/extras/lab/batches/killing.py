@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from daq.executors import LocalWorkers
-from daq.executors.workers import ending
+from daq.executors.local import ending
 from daq.traces.catalogue import list_traces
 from daq.traces.query import TraceQuery
 from extras.lab.batches.folder import Row, asked_of, opened

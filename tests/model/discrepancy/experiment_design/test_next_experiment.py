@@ -10,7 +10,6 @@ from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec, OfferedExperiment, Ramp
 from daq.contracts.trace import Trace
 from daq.safety.planned import planned
-from daq.trajectories.offered import offered_experiments
 from model.discrepancy.engine.candidate import Fitted
 from model.discrepancy.engine.fitting import LONG, Fit, fit
 from model.discrepancy.experiment_design.next_experiment import (
@@ -21,6 +20,7 @@ from model.discrepancy.experiment_design.next_experiment import (
 )
 from model.discrepancy.explanation.notes import note_words
 from model.machine_model.model import Model
+from server.jobs.next_experiment import offered_experiments
 from tests.model.discrepancy.readings.cases import case_of, fitted, searched
 from tests.model.fitting import imagined
 from trials.blind.recording import trial_experiment

@@ -415,48 +415,6 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/v1/robots/{robot}/calibrations/gain": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /**
-         * Calibrate Gain
-         * @description Queues the experiment that measures the actual proportional gain. GET …/traces/{trace}/gain then returns it.
-         *
-         *     It is checked like any experiment; the same Idempotency-Key returns the same experiment (200).
-         */
-        post: operations["calibrate_gain"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/v1/robots/{robot}/traces/{trace}/gain": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Get Measured Gain
-         * @description Returns the actual proportional gains measured from a trace.
-         */
-        get: operations["get_measured_gain"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
     "/api/v1/robots/{robot}/programs": {
         parameters: {
             query?: never;
@@ -503,26 +461,6 @@ export interface paths {
          * @description Deletes a program permanently.
          */
         delete: operations["delete_program"];
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/v1/robots/{robot}/programs/{program}/run": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /**
-         * Run Stored Program
-         * @description Runs a stored program, like POST …/teaching/program.
-         */
-        post: operations["run_stored_program"];
-        delete?: never;
         options?: never;
         head?: never;
         patch?: never;
@@ -1919,21 +1857,6 @@ export interface components {
                 components["schemas"]["Quantity"],
                 components["schemas"]["Quantity"]
             ];
-        };
-        /**
-         * CalibrationRequest
-         * @description Joints whose actual proportional gain is measured by small steps at several postures (section 6.5).
-         */
-        CalibrationRequest: {
-            /**
-             * Joints
-             * @default [
-             *       1,
-             *       2,
-             *       3
-             *     ]
-             */
-            joints?: number[];
         };
         /**
          * CameraStatus
@@ -4318,30 +4241,6 @@ export interface components {
              * @default true
              */
             is_known?: boolean;
-        };
-        /**
-         * MeasuredGain
-         * @description The actual proportional gain of one joint, in DAC counts per ADC count of error, and in V/rad at the motor; or
-         *     the reason why the trace does not determine it. All gains between `lowest` and `highest` agree with every sample.
-         */
-        MeasuredGain: {
-            /** Joint */
-            joint: number;
-            /** Gain */
-            gain?: number | null;
-            /** Standard Error */
-            standard_error?: number | null;
-            /** Lowest */
-            lowest?: number | null;
-            /** Highest */
-            highest?: number | null;
-            /** Volts Per Rad */
-            volts_per_rad?: number | null;
-            /**
-             * Reason
-             * @default
-             */
-            reason?: string;
         };
         /**
          * Member
@@ -7430,69 +7329,6 @@ export interface operations {
             };
         };
     };
-    calibrate_gain: {
-        parameters: {
-            query?: never;
-            header?: {
-                /** @description A request sent again with the same key is carried out once. */
-                "idempotency-key"?: string | null;
-            };
-            path: {
-                /** @description Name of the robot. */
-                robot: string;
-            };
-            cookie?: never;
-        };
-        requestBody: {
-            content: {
-                "application/json": components["schemas"]["CalibrationRequest"];
-            };
-        };
-        responses: {
-            /** @description OK */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["Experiment"];
-                };
-            };
-            /** @description Successful Response */
-            201: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["Experiment"];
-                };
-            };
-        };
-    };
-    get_measured_gain: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                trace: string;
-                /** @description Name of the robot. */
-                robot: string;
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["MeasuredGain"][];
-                };
-            };
-        };
-    };
     list_programs: {
         parameters: {
             query?: never;
@@ -7593,34 +7429,6 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
-            };
-        };
-    };
-    run_stored_program: {
-        parameters: {
-            query?: never;
-            header?: {
-                /** @description The lease that POST …/control returned. */
-                "Control-Lease"?: string | null;
-            };
-            path: {
-                /** @description Name of the program. */
-                program: string;
-                /** @description Name of the robot. */
-                robot: string;
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            202: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["TeachingStatus"];
-                };
             };
         };
     };
