@@ -79,7 +79,9 @@ class LineStageDialect:
     def __init__(self, numbers: Sequence[int]) -> None:
         if tuple(numbers) != (1, 2):
             raise ProtocolError("ids: this stage has two axes, write ids=1,2")
-        self.scale = LineScale(joints=AXES, set_point_units=COUNTS, position_counts=COUNTS, every=20, turn_bytes=90)
+        self.scale = LineScale(
+            joints=AXES, set_point_units=COUNTS, position_counts=COUNTS, every=20, turn_bytes=90, greeting_bytes=60
+        )
         self.damaged, self.complaint = 0, ""
         self._jobs: list[_Job] = []
         self._rest = self._next = b""
@@ -130,6 +132,10 @@ class LineStageDialect:
         """Returns the second step of a release, when the first has been answered."""
         written, self._next = self._next, b""
         return written
+
+    def farewell(self) -> bytes:
+        """Returns nothing: the stage does not react to a silent line, and holds its last goals."""
+        return b""
 
     def reset(self) -> None:
         """Drops requests in progress."""

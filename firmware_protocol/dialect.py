@@ -52,6 +52,10 @@ class LinkDialect(Protocol):
         """Returns bytes to write after `feed`: the next step of a request that needs several."""
         ...
 
+    def farewell(self) -> bytes:
+        """Returns bytes to write before the connection is closed in good order."""
+        ...
+
     def reset(self) -> None:
         """Discards unfinished input after a reconnection."""
         ...
@@ -121,6 +125,10 @@ class FramedDialect:
 
     def answer(self) -> bytes:
         """Returns nothing: every request is one frame."""
+        return b""
+
+    def farewell(self) -> bytes:
+        """Returns nothing: the arm stays at its last set points."""
         return b""
 
     def reset(self) -> None:

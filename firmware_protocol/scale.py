@@ -18,7 +18,9 @@ class LineScale:
     every:           control periods from one sample to the next on a fast enough line
     turn_bytes:      bytes per sample of all joints with their set points, both directions together; None for those of
                      PROTOCOL.md, which depend on the joints
+    greeting_bytes:  bytes of the answer to a greeting, if it is longer than an exchange
     measures_drive:  positions come with the controllers' outputs
+    half_duplex:     both sides share one wire, so a request must not be written while an answer may be coming
     """
 
     joints: int = JOINTS
@@ -26,4 +28,6 @@ class LineScale:
     position_counts: int = ADC_COUNTS
     every: int = 1
     turn_bytes: int | None = None
+    greeting_bytes: int = 0
+    half_duplex: bool = False
     measures_drive: bool = True

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 
 from daq.link.counters import Tally
 from daq.link.errors import LinkLostError, StopCameFirstError
@@ -105,14 +106,20 @@ class Connection:
         if data:
             with self._dialect_lock:
                 replies = self._dialect.feed(data)
-                answer = self._dialect.answer()
+                answer = b"" if self._dialect.scale.half_duplex else self._dialect.answer()
             now = self.now()
             with self.changed:
                 for sequence, reply in replies:
                     transaction = self._pending.match(sequence, reply, now)
                     if transaction is not None:
                         self._note_round_trip(transaction)
-            if answer:
+            if self._dialect.scale.half_duplex:
+                with self._write_lock:  # a stop may have been written meanwhile, which ends the steps of a release
+                    with self._dialect_lock:
+                        answer = self._dialect.answer()
+                    if answer:
+                        self._send(answer)
+            elif answer:
                 with self._write_lock:
                     self._send(answer)
         return data
@@ -148,6 +155,12 @@ class Connection:
 
     def close(self) -> None:
         """Closes the channel for good."""
+        if self._failure is None:
+            with self._dialect_lock:
+                last = self._dialect.farewell()
+            if last:
+                with self._write_lock, suppress(ChannelError):
+                    self._channel.write(last)
         self.fail(f"{self.description}: closed")
 
     def check(self) -> None:
@@ -165,10 +178,11 @@ class Connection:
                     frame = self._dialect.again(request, transaction.frame)
                 else:
                     frame = transaction.frame = self._dialect.encode(transaction.sequence, request)
-            frames += frame * copies_of(request)
+            frames += frame * (1 if self._dialect.scale.half_duplex else copies_of(request))
             transaction.written += 1
             transaction.written_at = now
-            transaction.deadline = now + self.timing.reply_timeout_s(request, len(frames))
+            wait = self.timing.reply_timeout_s(request, len(frames))
+            transaction.deadline = now + wait + self.timing.shared_wire_s(request, self._dialect.scale)
         self._send(frames)
 
     def _send(self, data: bytes) -> None:

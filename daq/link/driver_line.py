@@ -235,6 +235,10 @@ class DriverLine:
         """Returns nothing: a request has one step."""
         return b""
 
+    def farewell(self) -> bytes:
+        """Returns nothing: the robot holds its last set points."""
+        return b""
+
     def reset(self) -> None:
         """Drops requests in progress."""
         with self._changed:

@@ -7,11 +7,15 @@ from dataclasses import dataclass
 from firmware_protocol.commands import REPLIES, Hello, MoveAndSample, Sample, Stop
 from firmware_protocol.framing import FRAME_OVERHEAD, MAX_PAYLOAD
 from firmware_protocol.message import Request
+from firmware_protocol.scale import LineScale
 
 REPLY_MARGIN_S = 0.025
 """Time (s) for a reply beyond its time on the line: for bridge, adapter (USB delays bytes by up to 16 ms) and host."""
 STOP_MARGIN_S = 0.010
 """The same for a stop. It is repeated sooner because a repetition has no cost."""
+SHARED_STOP_MARGIN_S = REPLY_MARGIN_S
+"""The same for a stop on a wire that both sides share. An earlier repetition would collide with an answer. It would
+also interrupt the 20 ms of silence after which servos that received the stop halt by themselves."""
 RETRIES = 8
 """Repetitions of one request. If 10 % of the frames are damaged, one transaction in 10^6 fails."""
 HELLO_RETRIES = 40
@@ -49,6 +53,14 @@ class LinkTiming:
             return line + STOP_MARGIN_S
         waiting = self.period_s if isinstance(request, Sample | MoveAndSample) else 0.0
         return line + REPLY_MARGIN_S + waiting
+
+    def shared_wire_s(self, request: Request, scale: LineScale) -> float:
+        """Additional time (s) if both sides share one wire: an exchange on that line, or its greeting."""
+        if not scale.half_duplex:
+            return 0.0
+        answer = max(scale.turn_bytes or 0, scale.greeting_bytes if isinstance(request, Hello) else 0)
+        stop = SHARED_STOP_MARGIN_S - STOP_MARGIN_S if isinstance(request, Stop) else 0.0
+        return answer / self.bytes_per_second + stop
 
     def retries_of(self, request: Request) -> int:
         """How often `request` is repeated before it fails. Greeting and stop have separate numbers."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
-from daq.traces import disk, layout
+from daq.traces import cache, disk, layout
 from daq.traces.bounds import check_record, check_signals
 from daq.traces.decode import Decoded, decode
 from daq.traces.metadata import joints_of, one_line, record_of, signals_of
@@ -29,19 +29,34 @@ def read_trace(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Trace:
     """
     path = Path(path)
     try:
-        with disk.open_regular(path) as stream:
-            data = disk.read_at_most(stream, limits.file_bytes, str(path))
-        found = scan(data, str(path), limits)
         if path.name.endswith(layout.PART_SUFFIX):
-            # Even if only the final name is missing, the writer never confirmed that everything was written.
-            found.metadata.pop(layout.END_METADATA, None)
-        elif found.damage:
-            raise TraceError(f"{path}: is damaged after byte {found.good_bytes} of {len(data)}: {found.damage}")
-        return trace_of(found, str(path), limits)
+            return _decoded(path, limits)
+        with disk.open_regular(path) as stream:
+            if disk.size_of(stream) < cache.WORTH_IT:
+                return _decoded(path, limits)
+        key = cache.key_of(path, limits)
+        trace = cache.load(path, key)
+        if trace is None:
+            trace = _decoded(path, limits)
+            cache.store(path, key, trace)
     except OSError as error:
         raise TraceError(f"{path}: cannot be read: {disk.reason(error)}") from error
     except MemoryError as error:
         raise TraceError(f"{path}: {TOO_LARGE}") from error
+    return trace
+
+
+def _decoded(path: Path, limits: TraceLimits) -> Trace:
+    """Reads the trace from the file, without the cache. Raises TraceError, OSError."""
+    with disk.open_regular(path) as stream:
+        data = disk.read_at_most(stream, limits.file_bytes, str(path))
+    found = scan(data, str(path), limits)
+    if path.name.endswith(layout.PART_SUFFIX):
+        # Even if only the final name is missing, the writer never confirmed that everything was written.
+        found.metadata.pop(layout.END_METADATA, None)
+    elif found.damage:
+        raise TraceError(f"{path}: is damaged after byte {found.good_bytes} of {len(data)}: {found.damage}")
+    return trace_of(found, str(path), limits)
 
 
 def trace_of(found: Scan, origin: str, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Trace:

@@ -13,7 +13,7 @@ from typing import IO
 from daq.child import PIECE, Child, last_words
 from daq.contracts.extras import require_extra
 from daq.contracts.processor import processor_time
-from daq.transport.url import MockPort, TransportError
+from daq.transport.url import SERVOS, MockPort, TransportError
 
 START_TIMEOUT_S = 30.0
 """Longest time (s) for a mock to start: the first import of the physics engine from a cold disk takes seconds. Time
@@ -62,12 +62,14 @@ def start_mock(port: MockPort, *, waits: bool = False) -> MockProcess:
 
     Raises TransportError with the mock's error output if it does not start; MissingExtraError.
     """
-    require_extra("robot", "the mock controller", "mujoco")
+    if port.dialect != SERVOS:
+        require_extra("robot", "the mock controller", "mujoco")
     where = ("--pty",) if port.through_pty else ("--tcp", "127.0.0.1:0")
-    waiting = ("--waits",) if waits else ()
+    module = "mock_controller.servos" if port.dialect == SERVOS else "mock_controller"
+    waiting = ("--waits",) if waits and port.dialect != SERVOS else ()
     begun = time.monotonic()
     with tempfile.TemporaryFile() as complaints:
-        process = Child("mock_controller", *where, "--owned", *waiting, *port.arguments, complaints=complaints)
+        process = Child(module, *where, "--owned", *waiting, *port.arguments, complaints=complaints)
         try:
             ready = json.loads(_first_line(process.output, process.pid))
             os.set_blocking(process.output.fileno(), False)

@@ -1,9 +1,10 @@
 """Parses port URLs, which name the way to a controller. Pure; each mistake gets a one-line error.
 
 serial:///dev/ttyUSB0?baud=115200
-serial:///dev/ttyUSB0?baud=115200&dialect=mine&ids=1,2  (a dialect of a plug-in)
+serial:///dev/ttyUSB0?baud=1000000&dialect=dynamixel&ids=1,2
 tcp://192.168.1.20:4000
 mock://?lock_step=1&seed=3&fault=flip:rate=0.01
+mock://?dialect=dynamixel&ids=1,2
 lerobot:so101_follower?port=/dev/ttyACM0  (a Python driver, by the scheme of its plug-in)
 """
 
@@ -28,6 +29,8 @@ BITS_PER_BYTE = 10
 """Bits that a byte takes on the line: start bit, eight data bits, stop bit."""
 FRAMED = "framed"
 """The dialect of PROTOCOL.md, used if the URL names none."""
+SERVOS = "dynamixel"
+"""The dialect with a separate mock."""
 
 
 class TransportError(DaqError):
@@ -82,6 +85,7 @@ class MockPort:
     lock_step: bool = False
     through_pty: bool = False
     dialect: str = FRAMED
+    ids: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -93,6 +97,7 @@ class DriverPort:
     options: tuple[tuple[str, str], ...] = ()
     baud: int = DEFAULT_BAUD
     dialect: str = "python"
+    ids: tuple[int, ...] = ()
 
 
 PortUrl = SerialPort | TcpPort | MockPort | DriverPort
@@ -119,6 +124,8 @@ MOCK_VALUES = (
 )
 """Options of mock:// that are passed to the mock with their value."""
 REPEATABLE = ("modify", "fault")
+SERVO_VALUES = ("ids", "supply", "load", "coulomb", "secret")
+"""Options of mock://?dialect=dynamixel that are passed to the mock of servos with their value."""
 
 
 def serial_url(device: str) -> str:
@@ -149,7 +156,7 @@ def parse_port_url(text: str) -> PortUrl:
     if parts.scheme == "mock":
         if parts.netloc or parts.path not in ("", "/"):
             raise PortUrlError(f"port {text!r}: mock:// takes no address, only options after '?'")
-        return _mock(text, options)
+        return _mock_servos(text, options) if ("dialect", SERVOS) in options else _mock(text, options)
     others = f", or of a driver: {', '.join(sorted(drivers))}" if drivers else ""
     raise PortUrlError(f"port {text!r}: scheme {parts.scheme!r} is unknown: serial, tcp or mock{others}")
 
@@ -201,12 +208,23 @@ def _mock(text: str, options: list[tuple[str, str]]) -> MockPort:
     return MockPort(tuple(arguments), _baud(text, once), flags["lock_step"], flags["pty"])
 
 
+def _mock_servos(text: str, options: list[tuple[str, str]]) -> MockPort:
+    given = _single(text, options, ("dialect", "baud", "pty", *SERVO_VALUES))
+    dialect, ids = _dialect(text, given)
+    arguments = [f"--{name}={given[name]}" for name in SERVO_VALUES if name in given]
+    arguments.append("--torque")  # nobody could switch the torque on: this mock ends with its first connection
+    through_pty = _flag(text, "pty", given.get("pty"))
+    return MockPort(tuple(arguments), _baud(text, given), through_pty=through_pty, dialect=dialect, ids=ids)
+
+
 def _dialect(text: str, options: Mapping[str, str]) -> tuple[str, tuple[int, ...]]:
     """Returns the dialect, and the joints' IDs on its bus."""
     dialect, ids = options.get("dialect", FRAMED), options.get("ids", "")
     numbers = ids.split(",") if ids else []
     if not all(number.isdecimal() and len(number) <= 5 for number in numbers):
         raise PortUrlError(f"port {text!r}: ids {ids!r}: write whole numbers in the order of the joints, as in ids=1,2")
+    if dialect == SERVOS and not numbers:
+        raise PortUrlError(f"port {text!r}: needs the servos' IDs in the order of the joints, as in ids=1,2")
     return dialect, tuple(map(int, numbers))
 
 

@@ -20,7 +20,7 @@ BEGIN = """# Every option
 Made from the command line itself. [Command line](../command-line.md) shows every command with an example, and
 the exit codes. `daq COMMAND --help` prints the same. Every command takes `--help`.
 """
-OWN_HELP = {"mock": (("mock_controller",),)}
+OWN_HELP = {"mock": (("mock_controller",), ("mock_controller.servos",))}
 """Commands that hand what they are given to other programs, whose help is shown."""
 
 

@@ -1,4 +1,4 @@
-"""docs/command-line.md shows every command there is, and no other."""
+"""docs/command-line.md shows every command there is, no other; what docs/your-robot.md types can be typed."""
 
 import importlib
 import pkgutil
@@ -18,7 +18,8 @@ from daq_cli.app.subcommands import subcommands
 from tests.daq_cli.invoke import CommandLine
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "command-line.md").read_text("utf-8")
+PAGE, YOUR_ROBOT = ((ROOT / "docs" / name).read_text("utf-8") for name in ("command-line.md", "your-robot.md"))
+LINES = re.findall(r"^\$ daq (.*)$", YOUR_ROBOT, re.MULTILINE)
 SHOWN = [shlex.split(text) for text in re.findall(r"^- .*: `daq ([^`]+)`$", PAGE, re.MULTILINE)]
 EXAMPLES = [words for words in SHOWN if words[0] in subcommands()]
 """Of what is installed: the page also shows what is optional."""
@@ -50,7 +51,7 @@ def test_every_command_has_an_example() -> None:
     assert {command_of(words) for words in EXAMPLES} == set(COMMANDS)
 
 
-@pytest.mark.parametrize("words", EXAMPLES, ids=" ".join)
+@pytest.mark.parametrize("words", [*EXAMPLES, *map(shlex.split, LINES)], ids=" ".join)
 def test_every_example_can_be_typed(words: list[str]) -> None:
     name = command_of(words)
     if name != ("mock",):  # its options are the mock's own
@@ -77,6 +78,20 @@ def test_every_exit_code_is_explained() -> None:
     assert explained == used
 
 
-def test_a_dialect_that_is_unknown_is_told_by_the_check_of_settings(daq: CommandLine, tmp_path: Path) -> None:
-    (tmp_path / "daq.toml").write_text('[robot]\nport = "serial:///dev/arm?dialect=nobodys&ids=1"\n')
+# ---- docs/your-robot.md: its settings are settings
+
+
+(SETTINGS,) = re.findall(r"```toml\n(\[robot\]\n.*?)```", YOUR_ROBOT, re.DOTALL)
+
+
+def test_the_check_of_the_page_s_settings_speaks_of_its_dialect_and_of_no_memory_map(
+    daq: CommandLine, tmp_path: Path
+) -> None:
+    settings = SETTINGS.replace("examples/", f"{ROOT}/examples/").replace("$PWD", str(tmp_path))
+    (tmp_path / "daq.toml").write_text(settings)
+    said = daq("--config", tmp_path / "daq.toml", "config", "check")
+    assert said.code == 0, said.err
+    assert "dialect:       dynamixel" in said.out
+    assert "memory map:" not in said.out
+    (tmp_path / "daq.toml").write_text(settings.replace("dynamixel", "nobodys"))
     daq("--config", tmp_path / "daq.toml", "config", "check").complains(2, "dialect 'nobodys' is unknown")

@@ -12,6 +12,7 @@ from daq.contracts.service.robot import RobotStatus
 from daq.contracts.status import StatusReport, report_of
 from daq.trajectories.presets import PRESETS
 from model.fitting.fitted import FittedParameter
+from tests.daq.servo_bench import PAN_TILT
 from tests.daq.traces.samples import write
 from tests.daq_cli.invoke import CommandLine
 from tests.daq_cli.test_documentation import COMMANDS
@@ -62,7 +63,7 @@ def test_a_local_status_has_the_fields_of_a_service(daq: CommandLine, port: str)
 def test_a_local_status_with_another_machines_file_shows_no_angles(
     daq: CommandLine, port: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("DAQ_ROBOT__MACHINE", str(Path(__file__).parents[2] / "examples/pan_tilt.toml"))
+    monkeypatch.setenv("DAQ_ROBOT__MACHINE", str(PAN_TILT))
     daq("--port", port, "status").complains(4, "has 6 joints, the machine file pan_tilt describes 2")
 
 

@@ -5,7 +5,6 @@ The stage is that of the example's rig, which shares no code with them; its time
 
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 from importlib.util import module_from_spec, spec_from_file_location
 from itertools import pairwise
 from pathlib import Path
@@ -19,13 +18,13 @@ from hypothesis import strategies as st
 
 from daq.contracts.experiment import ExperimentSpec, Multisine
 from daq.contracts.machine import load_machine
-from daq.driver import Controller, HardwareFaultError
+from daq.driver import Controller
 from daq.link import Link, LinkTimeoutError, RequestRefusedError
 from daq.runner.arm_control import ArmControl
 from daq.runner.experiment import RunSetup, StopRequests, run_experiment
 from daq.runner.preparation import Consent
 from daq.traces.reader import read_trace
-from firmware_protocol.commands import Capability, FineSetPoints, Hello, Sample, Snapshot, StatusFlag, Stop
+from firmware_protocol.commands import Capability, FineSetPoints, Hello, Sample, StatusFlag, Stop
 from model.machine_model.model import base_model
 from model.simulation.simulate import simulate
 from tests.daq.quiet import Quiet
@@ -48,7 +47,7 @@ DIALECT, RIG = example("line_stage_dialect"), example("line_stage_rig")
 
 
 class Line:
-    """Endpoint, channel and clock at once. `hearing` may change or lose what is written."""
+    """Endpoint, channel and clock at once, as `tests.daq.servo_bench`. `hearing` may change or lose what is written."""
 
     lock_step = False
     url = description = "a stage in memory"
@@ -200,21 +199,6 @@ def test_a_silent_stage_is_told_and_what_was_said_before_does_not_count(line: Li
     line.hearing = lambda _: b""
     with pytest.raises(LinkTimeoutError, match="no reply to Hello"):
         line.controller()
-
-
-def test_a_drive_that_reports_an_error_is_told_with_its_joint(
-    controller: Controller, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    feed = DIALECT.LineStageDialect.feed
-
-    def faulty(dialect: Any, data: bytes) -> list[Any]:
-        broken = StatusFlag.HARDWARE_ERROR
-        replies = feed(dialect, data)
-        return [(n, replace(r, status=r.status | broken) if isinstance(r, Snapshot) else r) for n, r in replies]
-
-    monkeypatch.setattr(DIALECT.LineStageDialect, "feed", faulty)
-    with pytest.raises(HardwareFaultError, match="hardware error: its joint may be without torque"):
-        controller.next_snapshot()
 
 
 @given(

@@ -13,10 +13,11 @@ from daq.link.dialects import dialect_of
 from daq.link.timing import RETRIES, LinkTiming
 from daq.link.turn_exchange import MarkCounter
 from daq.plugins import Plugin
-from daq.transport import SerialPort, parse_port_url
+from daq.transport import MockPort, SerialPort, parse_port_url
 from daq.transport.url import PortUrlError
 from firmware_protocol.commands import Advance, Advanced, Hello, ReadStatus, Sample, Status, Stop, Stopped
 from firmware_protocol.dialect import IDLE_MARK, FramedDialect
+from firmware_protocol.dynamixel.dialect import DynamixelDialect
 from firmware_protocol.message import Request
 from firmware_protocol.scale import LineScale
 from tests.daq.link.scripted import frame_of, once_silent, says, scripted_link
@@ -35,8 +36,13 @@ class Mine(FramedDialect):
 def test_a_url_names_the_dialect_and_its_options() -> None:
     assert isinstance(dialect_of("serial:///dev/ttyUSB0"), FramedDialect)
     assert dialect_of("mock://").scale == LineScale()
-    url = "serial:///dev/ttyUSB0?baud=1000000&dialect=mine&ids=5,3"
-    assert parse_port_url(url) == SerialPort("/dev/ttyUSB0", 1000000, "mine", (5, 3))
+    url = "serial:///dev/ttyUSB0?baud=1000000&dialect=dynamixel&ids=5,3"
+    assert parse_port_url(url) == SerialPort("/dev/ttyUSB0", 1000000, "dynamixel", (5, 3))
+    dialect = dialect_of(url)
+    assert isinstance(dialect, DynamixelDialect)
+    assert (dialect.scale.joints, dialect.scale.set_point_units) == (2, 4096)
+    port = parse_port_url("mock://?dialect=dynamixel&ids=1,2&load=0.2&baud=57600")
+    assert port == MockPort(("--ids=1,2", "--load=0.2", "--torque"), 57600, dialect="dynamixel", ids=(1, 2))
 
 
 def installed(folder: Path, monkeypatch: pytest.MonkeyPatch, text: str) -> None:
@@ -75,9 +81,12 @@ def test_a_dialect_of_another_package_that_fails_gets_one_line(
 @pytest.mark.parametrize(
     ("url", "line"),
     [
-        ("tcp://arm:1?dialect=nobodys", "dialect 'nobodys' is unknown: framed"),
-        ("tcp://arm:1?dialect=mine&ids=1,x", "ids '1,x': write whole numbers in the order of the joints"),
-        ("mock://?dialect=mine", "unknown option 'dialect'"),
+        ("tcp://arm:1?dialect=nobodys", "dialect 'nobodys' is unknown: dynamixel, framed"),
+        ("tcp://arm:1?dialect=dynamixel", "needs the servos' IDs in the order of the joints, as in ids=1,2"),
+        ("tcp://arm:1?dialect=dynamixel&ids=1,x", "ids '1,x': write whole numbers in the order of the joints"),
+        ("tcp://arm:1?dialect=dynamixel&ids=1,1", "1 to 6 different ones from 0 to 252"),
+        ("tcp://arm:1?dialect=dynamixel&ids=1,253", "1 to 6 different ones from 0 to 252"),
+        ("mock://?dialect=dynamixel&ids=1,2&fault=flip", "unknown option 'fault'"),
     ],
 )
 def test_a_wrong_name_or_number_gets_one_line(url: str, line: str) -> None:
@@ -102,11 +111,17 @@ def test_a_reply_may_take_its_time_on_the_line_and_a_margin_and_a_sample_a_perio
     assert LinkTiming(float("inf"), 0.03).reply_timeout_s(request_, 100) == pytest.approx(beyond_the_line)
 
 
-def test_a_greeting_and_a_stop_have_their_own_numbers_of_repeats() -> None:
+def test_times_of_replies_and_repeats_leave_room_for_a_shared_wire_and_a_stop() -> None:
     assert [LINE.retries_of(request) for request in (ReadStatus(), Hello(2, 1), Stop())] == [8, 40, 50]
     patient = LinkTiming(11520.0, retries=60)
     assert [patient.retries_of(request) for request in (ReadStatus(), Hello(2, 1), Stop())] == [60, 60, 50]
     assert LinkTiming(11520.0).period_s == 0.020
+    shared = LineScale(turn_bytes=400, greeting_bytes=1000, half_duplex=True)
+    line = LinkTiming(5760.0)
+    assert line.shared_wire_s(ReadStatus(), shared) == pytest.approx(400 / 5760)
+    assert line.shared_wire_s(Hello(2, 1), shared) == pytest.approx(1000 / 5760)
+    assert line.shared_wire_s(Hello(2, 1), LineScale(turn_bytes=400)) == 0.0
+    assert line.reply_timeout_s(Stop(), 30) + line.shared_wire_s(Stop(), shared) > 0.020
 
 
 # ---- What is counted from a mark on, beside what is counted from the beginning

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from daq.contracts.errors import SafetyError
-from daq.contracts.machine import load_machine
 from daq.contracts.sample import SampleRow
 from daq.driver import Controller
 from daq.runner.arm_control import ArmControl, StoppedError
@@ -19,6 +18,7 @@ from daq.teaching.program import Program
 from daq.teaching.program_plan import plan_program, run_program
 from daq.teaching.recording import RecordedPath
 from tests.control_port import told_by
+from tests.daq.servo_bench import pan_tilt
 from tests.daq.teaching.stand_in import MA2000
 
 
@@ -76,7 +76,7 @@ def test_a_machine_file_of_another_controller_is_refused(controller: Controller,
     with pytest.raises(SafetyError, match="control period of 20 ms, the machine file ma2000 says 30 ms"):
         ControllerArm(controller, ArmControl(controller), other, lambda: None)
     with pytest.raises(SafetyError, match="has 6 joints, the machine file pan_tilt describes 2"):
-        ControllerArm(controller, ArmControl(controller), load_machine("examples/pan_tilt.toml"), lambda: None)
+        ControllerArm(controller, ArmControl(controller), pan_tilt(), lambda: None)
     before = controller.next_snapshot().set_points
     with pytest.raises(TeachingError, match="only while the arm is driven: it is idle"):
         arm.set_points({1: 600})

@@ -144,7 +144,7 @@ def test_a_motor_other_than_the_files_is_judged_as_one_that_the_file_states(tmp_
     assert found.residual != pytest.approx(as_file.residual, rel=0.1)
 
 
-def test_a_record_of_one_joint_does_not_tell_the_others() -> None:
+def test_a_record_of_one_joint_does_not_tell_the_others(tmp_path: Path) -> None:
     machine = load_machine(str(EXAMPLES / "pan_tilt.toml"))
     one = swinging(1)
     still, tilt = np.full(len(one), np.pi), one.position[:, 0] + 2.4

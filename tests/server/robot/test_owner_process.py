@@ -17,6 +17,7 @@ from daq.owner.start import start_owner
 from daq.transport import ReconnectDelay
 from server.robot.keeper import Keeper
 from server.robot.robot import Robot, RobotPlace
+from tests.daq.servo_bench import pan_tilt
 from tests.server.clocks import HandClock
 
 HALF = '{"kind":"answer","num'
@@ -98,9 +99,7 @@ def test_whatever_keeps_it_from_connecting_is_tried_again(error: Exception) -> N
 def test_a_robot_with_another_machines_file_is_not_connected(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its live angles would be wrong."""
     monkeypatch.setenv("DAQ_RUNTIME_FOLDER", str(tmp_path))
-    robot = Robot(
-        RobotPlace("ma2000", "mock://?lock_step=1", load_machine("examples/pan_tilt.toml"), tmp_path), HandClock()
-    )
+    robot = Robot(RobotPlace("ma2000", "mock://?lock_step=1", pan_tilt(), tmp_path), HandClock())
     with pytest.raises(DaqError, match="has 6 joints, the machine file pan_tilt describes 2"):
         robot.connect()
     assert robot.identity is None

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from daq.traces.reader import read_trace
+from tests.daq.servo_bench import PAN_TILT
 from tests.daq.traces.samples import write
 from tests.daq_cli.invoke import CommandLine
 from tests.extras.formats.bags.test_ros_bag import bag
@@ -38,7 +39,7 @@ def test_what_is_no_bag_or_leaves_a_choice_is_told_in_one_line(daq: CommandLine,
 def test_joints_have_the_numbers_of_the_configured_machine_and_it_is_told(daq: CommandLine, tmp_path: Path) -> None:
     turned = {"names": ["tilt", "pan"], "position": [7.0, 8.0]}
     path = bag(tmp_path / "a", [turned] * 3)
-    (tmp_path / "daq.toml").write_text(f'[robot]\nmachine = "{Path(__file__).parents[4]}/examples/pan_tilt.toml"\n')
+    (tmp_path / "daq.toml").write_text(f'[robot]\nmachine = "{PAN_TILT}"\n')
     said = daq("--config", tmp_path / "daq.toml", "traces", "import", path, "--drive-unit", "Nm")
     assert "From topic /joint_states, joints 2 tilt, 1 pan." in said.err
     trace = read_trace(Path(said.out.strip()))
