@@ -11,7 +11,7 @@ from daq.contracts.errors import TraceError
 from daq.contracts.trace_limits import TraceLimits
 from daq.traces import disk
 from daq.traces.kinds import first_bytes, is_trace
-from extras.formats.bags.bag_storage import METADATA, ROS_1_MAGIC, SQLITE_MAGIC, journals_of
+from extras.formats.bags.bag_storage import METADATA, ROS_1_MAGIC, SQLITE_MAGIC
 
 STORAGES = (".mcap", ".db3", ".bag")
 COMPRESSED = ".zstd"
@@ -41,7 +41,7 @@ def check_files(path: Path, limits: TraceLimits) -> None:
         wanted = f"a folder with {METADATA}, or a file {', '.join(STORAGES)}"
         raise TraceError(f"{path}: {f'is no bag: that is {wanted}' if path.exists() else 'there is no such bag'}")
     try:
-        files = sorted(path.iterdir()) if path.is_dir() else [path, *journals_of(path)]
+        files = sorted(path.iterdir()) if path.is_dir() else [path]
         total = 0
         for file in files:  # with any name: metadata.yaml selects the files
             if not file.is_dir():
