@@ -30,10 +30,10 @@ import numpy as np
 
 from daq.contracts.documents import parse_toml, read_text
 from model.discrepancy.diagnosis import Diagnosis
-from model.trial.registration import RegisteredCode
 from model.trial.score import excess_removed_whole
-from model.trial.table import rate
 from trials.blind.registered import REGISTERED, library_versions, registering_commit, tree_hashes
+from trials.blind.registration import RegisteredCode
+from trials.blind.table import rate
 from trials.judge import QUESTIONS, TOLD_APART, covered, diagnose, names_of, score
 from trials.rigs.folder import write_rig
 from trials.rigs.kinds import KINDS

@@ -22,7 +22,6 @@ from daq.executors import Workers, done_in_any_order
 from daq.executors.local import growing
 from model.machine_model.model import base_model
 from model.trial.score import Score, score, score_of_failure
-from model.trial.table import TrialTable, trial_table
 from model.trial.truth import Detectability, parse_truth
 from trials.blind.folder import STAGES, Stage, TrialFolder
 from trials.blind.recording import Recorded, machine_with_load, record, trial_experiment, write_set_points
@@ -35,6 +34,7 @@ from trials.blind.sealed import (
     diagnose_sealed,
     reveal,
 )
+from trials.blind.table import TrialTable, trial_table
 
 Progress = Callable[[int, str], None]
 

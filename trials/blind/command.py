@@ -100,7 +100,7 @@ def _asked_for(context: typer.Context, option: str) -> bool:
 
 
 def _chosen(seeds: str, kinds: str, loads: str, cases: int | None) -> list[int]:
-    from model.trial.registration import KINDS, LOADS, arms, parse_choice, parse_numbers, sample_arms
+    from trials.blind.registration import KINDS, LOADS, arms, parse_choice, parse_numbers, sample_arms
 
     found = arms(parse_numbers(seeds), parse_choice(kinds, KINDS, "kind"), parse_choice(loads, LOADS, "load"))
     return found if cases is None else sample_arms(found, cases)
@@ -119,7 +119,7 @@ def _registered(path: Path, run: str) -> tuple[list[int], Literal["diagnostic", 
 
 
 def _show(campaign: Campaign, folder: Path, *, as_json: bool) -> None:
-    from model.trial.table import as_csv, as_markdown
+    from trials.blind.table import as_csv, as_markdown
 
     table = campaign.table()
     (folder / "cases.csv").write_text(as_csv(campaign.scores()), "utf-8")

@@ -11,7 +11,7 @@ from pathlib import Path
 import daq
 from daq.contracts.documents import read_text
 from daq.contracts.errors import SpecError
-from model.trial.registration import Registration, parse_registration
+from trials.blind.registration import Registration, parse_registration
 
 REGISTERED = (
     "model/discrepancy/thresholds.py",

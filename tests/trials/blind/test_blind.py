@@ -20,7 +20,6 @@ from daq.executors.local import ending
 from daq.traces.reader import read_trace
 from model.discrepancy.diagnosis import Diagnosis
 from model.machine_model.model import base_model
-from model.trial.registration import compose
 from tests.daq.executors.by_hand import WorkersByHand, WorkersInThreads
 from tests.daq_cli.invoke import CommandLine
 from trials.blind import sealed
@@ -28,6 +27,7 @@ from trials.blind.campaign import Campaign
 from trials.blind.folder import TrialFolder
 from trials.blind.recording import Recorded, machine_with_load, trial_experiment, write_set_points
 from trials.blind.registered import REGISTERED, library_versions, source_tree, to_register, tree_hashes
+from trials.blind.registration import compose
 from trials.blind.sealed import TrialStageError, diagnose_sealed
 
 FAKE = (sys.executable, str(Path(__file__).with_name("fake_diagnoser.py")))

@@ -7,7 +7,10 @@ import pytest
 from daq.contracts.errors import SpecError
 from mock_controller.hidden.arm import Kind, Load, compose_seed, draw_arm
 from model.discrepancy.diagnosis import Diagnosis
-from model.trial.registration import (
+from model.trial.score import Score, score
+from model.trial.truth import Truth
+from tests.model.trial.answers import MACHINE, answer, seen, step, truth
+from trials.blind.registration import (
     KINDS,
     LOADS,
     arms,
@@ -18,10 +21,7 @@ from model.trial.registration import (
     parse_registration,
     sample_arms,
 )
-from model.trial.score import Score, score
-from model.trial.table import TrialTable, as_csv, as_markdown, quantiles, rate, trial_table
-from model.trial.truth import Truth
-from tests.model.trial.answers import MACHINE, answer, seen, step, truth
+from trials.blind.table import TrialTable, as_csv, as_markdown, quantiles, rate, trial_table
 
 TEXT = """
 version = 1
