@@ -167,9 +167,8 @@ def install(app: FastAPI) -> None:
     @app.exception_handler(RequestValidationError)
     async def not_valid(request: Request, error: RequestValidationError) -> JSONResponse:
         fields = [FieldProblem(field=_where(one), message=_what(one)) for one in error.errors()[:20]]
-        detail = f"{fields[0].field}: {fields[0].message}" if fields else "the request is not valid"
-        advice = "correct the fields named; /api/v1/openapi.json says what is allowed"
-        return response(request, ProblemError(422, "not-valid", detail, advice, fields))
+        detail = _told(fields[0]) if fields else "the request is not valid"
+        return response(request, ProblemError(422, "not-valid", detail, "correct what is named", fields))
 
     @app.exception_handler(HTTPException)
     async def http(request: Request, error: HTTPException) -> JSONResponse:
@@ -208,6 +207,11 @@ def field_of(place: Sequence[int | str]) -> str:
 def _where(error: Mapping[str, Any]) -> str:
     # whose location contains the byte's number
     return "body" if error["type"] == "json_invalid" else field_of(error["loc"])
+
+
+def _told(problem: FieldProblem) -> str:
+    # of the whole body, the message says where
+    return problem.message if problem.field == "body" else f"{problem.field}: {problem.message}"
 
 
 def _what(error: Mapping[str, Any]) -> str:

@@ -102,8 +102,8 @@ def _unknown(words: list[str]) -> str:
         wrong = f", not {words[1][:40]!r}" if words[1:] else ""
         return f"{words[0]}: needs one of {', '.join(ALLOWED[words[0]])}{wrong}"
     if words and words[0] in CORE:
-        return f"{words[0]}: not in the console; type it in a terminal. Here are {', '.join(ALLOWED)}"
-    return f"{' '.join(words)[:40]!r}: no such command; there are help, {', '.join(ALLOWED)}"
+        return f"{words[0]}: not in the console; type it in a terminal. Here are {', '.join(ALLOWED)}, macro"
+    return f"{' '.join(words)[:40]!r}: no such command; there are help, {', '.join(ALLOWED)}, macro"
 
 
 @cache

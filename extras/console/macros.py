@@ -55,12 +55,15 @@ def expand(macro: Macro, values: dict[str, Value], machine: Machine) -> MacroRea
 
 
 def _order(words: list[str], where: str, name: str, machine: Machine) -> ConsoleOrder:
+    alone = f"{where}: a macro has lines of `run` alone, without --dry-run"
+    if words[:1] != ["run"]:
+        raise SpecError(f"{alone}, not {' '.join(words)[:40]!r}")
     try:
         order = read_words(words, machine)
     except SpecError as error:
         raise SpecError(f"{where}: {error}") from None
     if order.spec is None or order.dry_run:
-        raise SpecError(f"{where}: a macro has lines of `run` alone, without --dry-run")
+        raise SpecError(alone)
     named = order.spec if order.spec.name else order.spec.model_copy(update={"name": name})
     return order.model_copy(update={"spec": named})
 

@@ -93,7 +93,7 @@ class Macro(UserWire):
             raise ValueError("two parameters have one name")
         used = {name for line in self.lines for name in PLACE.findall(line)}
         if unknown := sorted(used - set(names)):
-            raise ValueError(f"{{{unknown[0]}}} is no parameter; add it, or remove it from the line")
+            raise ValueError(f"{{{unknown[0]}}} is no parameter; make it one, or write a value in its place")
         if idle := sorted(set(names) - used):
             raise ValueError(f"no line uses {{{idle[0]}}}; remove the parameter, or use it")
         return self

@@ -96,14 +96,17 @@ def _proof(step: Step) -> str:
 
 def _size(value: FoundValue, *, several: bool, sliding: bool) -> str:
     on = f" of {joints_in_words(value.joints)}" if several and value.joints else ""
-    unit = "" if value.unit == "1" else f" {value.unit}"
+    factor, unit = shown_unit(value.unit)
+    text = plain(value.value * factor, 3)
     if value.part == "cycles":  # rad of phase per rad (m): cycles a turn, or 2π times those a metre
-        unit = f" rad/m, {plain(value.value / (2 * math.pi), 3)} a metre" if sliding else " a turn"
-    return f"{value.part}{on} {plain(value.value, 3)}{unit}"
+        text += f" rad/m, {plain(value.value / (2 * math.pi), 3)} a metre" if sliding else " a turn"
+    elif unit != "1":
+        text = with_unit(text, unit)
+    return f"{value.part}{on} {text}"
 
 
 def _removed(share: float) -> str:
-    square = "the mean square on records not fitted to"
+    square = "the mean square error on records not fitted to"
     return f"; {square} grows by {-share:.0%}" if share < 0.0 else f"; it takes {percent_gone(share, 0)} off {square}"
 
 

@@ -129,7 +129,7 @@ TEXT = [{"name": "a", "type": "text", "default": "1"}]
         (_macro(), {"a": 10}, "one: a: "),
         (_macro(), {"b": 1}, "one: b: "),
         (_macro(), {"a": "much"}, "one: a: "),
-        (_macro(lines=["stop {a}"]), {}, "one, line 1: stop: "),
+        (_macro(lines=["stop {a}"]), {}, "one, line 1: a macro has lines of `run` alone"),
         (_macro(lines=["queue pause"], parameters=[]), {}, "lines of `run` alone"),
         (_macro(lines=["run ramp --dry-run --amplitude {a}"]), {}, "without --dry-run"),
         (_macro(parameters=TEXT), {"a": "1 --cron '* * * * *'"}, "amplitude"),

@@ -228,8 +228,17 @@ function drawMarkers(plot: uPlot, drawing: ChartDrawing): void {
     gap: 4 * ratio,
     width: (text: string) => ctx.measureText(text).width,
   };
+  ctx.setLineDash([]);
   for (const { left, text, index } of placedFlags(marks, room)) {
-    ctx.fillStyle = colours[marks[index]?.tone ?? 'plain'];
+    const { x, tone } = marks[index]!;
+    ctx.fillStyle = ctx.strokeStyle = colours[tone];
+    if (tone !== 'tick') {
+      // Its line goes up to its name: lines that have none end below, so none seems to have the name beside it.
+      ctx.beginPath();
+      ctx.moveTo(x, bbox.top - 14 * ratio);
+      ctx.lineTo(x, bbox.top);
+      ctx.stroke();
+    }
     ctx.fillText(text, left, bbox.top - 14 * ratio);
   }
   ctx.restore();

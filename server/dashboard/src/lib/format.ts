@@ -92,11 +92,11 @@ export function spoken(name: string | null): string {
   return name === null ? 'somebody' : name === 'local' ? 'somebody at the service’s computer' : name;
 }
 
-/** A one-line message of the service with a capital letter and a full stop; nothing remains nothing. */
+/** A one-line message of the service with a capital letter and a full stop, % kept with its number; empty stays so. */
 export function sentence(text: string): string {
   const whole = text.trim();
   if (whole === '') return '';
-  const first = capital(whole);
+  const first = capital(whole).replace(/(\d) %/g, '$1\u00a0%');
   return /[.!?]$/.test(first) ? first : `${first}.`;
 }
 

@@ -70,7 +70,7 @@ export function helpOf(words: readonly string[], commands: readonly ConsoleComma
   }
   const wanted = commands.filter((one) => words.every((word, place) => one.words[place] === word));
   const shown = wanted.length > 0 ? wanted : commands;
-  return inColumns(shown.map((one) => [one.words.join(' '), one.help]));
+  return inColumns(shown.map((one) => [one.words.join(' '), one.help.replaceAll('`daq ', '`')]));
 }
 
 /** Options of a line that have a value: `--amplitude 5`. `at`: where the value begins. */

@@ -28,7 +28,6 @@ const step = (group: TriedEffect[]): DiagnosisStep =>
     not_a_finding: '',
     joints: [2],
     evidence: 100,
-    margin: 20,
     adopted: true,
     candidates,
     group,

@@ -19,7 +19,7 @@ export interface EvidenceBar {
 /** What was tried in one turn, and what it led to: an effect, or none. */
 export type Turn = Pick<
   DiagnosisStep,
-  'candidates' | 'group' | 'effect' | 'joints' | 'evidence' | 'evidence_held_out' | 'margin'
+  'candidates' | 'group' | 'effect' | 'joints' | 'evidence' | 'evidence_held_out'
 > & {
   /** Evidence from which an effect would have been named; null where one was, or where it is not told. */
   needed: number | null;
@@ -42,7 +42,6 @@ export function turnWithoutStep(found: DiagnosisData): Turn | null {
     joints: [],
     evidence: 0,
     evidence_held_out: null,
-    margin: 0,
     needed,
   };
 }
@@ -55,8 +54,7 @@ export function evidenceBars(turn: Turn, most: number): EvidenceBar[] {
   const best = [...turn.candidates].sort((one, other) => total(other) - total(one));
   const ranked = [...best.filter((one) => one.refitted), ...best.filter((one) => !one.refitted)];
   const widest = Math.max(1, turn.needed ?? 1, ranked[0] ? total(ranked[0]) : 1);
-  const named = new Set(turn.group.map(key));
-  if (turn.effect !== null) named.add(key({ effect: turn.effect, joints: turn.joints }));
+  const named = namedIn(turn);
   return ranked.slice(0, most).map((one) => ({
     name: one.called,
     joint: one.joints[0] ?? null,
@@ -73,13 +71,32 @@ export function evidenceBars(turn: Turn, most: number): EvidenceBar[] {
 function reasonOf(one: TriedEffect, turn: Turn, chosen: boolean): string {
   if (chosen && turn.group.length > 1)
     return 'not distinguishable from the others of its group by these traces';
-  if (chosen) return `leads every other effect by ${Math.round(turn.margin)}`;
+  if (chosen) return leadWords(turn);
   if (!one.refitted) return 'estimated by a quick probe, not fitted';
   if (total(one) <= 0) return 'explains less than its parameters cost';
   if (turn.needed !== null && total(one) < turn.needed)
     return `below the ${Math.round(turn.needed)} that are needed`;
   if (turn.effect === null) return 'rejected';
   return `explains ${Math.round(total(turn) - total(one))} less than the best`;
+}
+
+type Named = Pick<Turn, 'candidates' | 'group' | 'effect' | 'joints'>;
+
+/** How far what is named leads every other effect that was fitted, by all traces. */
+export function leadWords(turn: Named): string {
+  const named = namedIn(turn);
+  const fitted = turn.candidates.filter((one) => one.refitted);
+  const best = (of: readonly TriedEffect[]): number => Math.max(...of.map(total));
+  const others = fitted.filter((one) => !named.has(key(one)));
+  const own = fitted.filter((one) => named.has(key(one)));
+  if (others.length === 0 || own.length === 0) return 'no other effect was fitted';
+  const lead = Math.round(best(own) - best(others));
+  return lead < 0 ? `another effect has ${-lead} more` : `leads every other effect by ${lead}`;
+}
+
+/** The keys of what a turn names. */
+export function namedIn(turn: Omit<Named, 'candidates'>): Set<string> {
+  return new Set([key({ effect: turn.effect ?? '', joints: turn.joints }), ...turn.group.map(key)]);
 }
 
 /** What fitted and held-out traces say together. */

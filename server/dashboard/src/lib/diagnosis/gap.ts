@@ -1,6 +1,7 @@
 /** How the gap between measurement and simulation shrinks, step by step, against the noise floor. */
 
 import type { DiagnosisData } from '../api/types';
+import { parameterName } from '../models/parameters';
 
 export interface Stage {
   name: string;
@@ -20,6 +21,15 @@ export interface Gap {
   without: string;
 }
 
+/** What the numbers alone would make of it, in words, with the parameters called as on the page. */
+export function withoutText({ gap, words }: Pick<DiagnosisData, 'gap' | 'words'>): string {
+  const without = gap?.without;
+  return (without?.numbers ?? []).reduce(
+    (text, { name }) => text.replaceAll(name, parameterName(name, words)),
+    without?.text ?? '',
+  );
+}
+
 /** The stages of a diagnosis: the model as given, with every effect that was added, with everything refitted. */
 export function gapOf(found: DiagnosisData): Gap {
   const gap = found.gap;
@@ -28,7 +38,7 @@ export function gapOf(found: DiagnosisData): Gap {
     joints: gap.joints,
     units: gap.units,
     floor: gap.noise,
-    without: gap.without?.text ?? '',
+    without: withoutText(found),
     stages: gap.stages.map((stage, place) => ({
       name: stage.name,
       label: labelOf(

@@ -3,6 +3,7 @@ import type { DiagnosisStep, TriedEffect } from '../api/types';
 import {
   answeredJoints,
   besideAnswer,
+  closedWords,
   heatOverTime,
   scenesOf,
   shareText,
@@ -35,8 +36,9 @@ describe('candidates', () => {
     const [best, next] = toldOf(step, 10);
     expect(best!.share).toBeCloseTo(1 / (1 + Math.exp(-2)));
     expect([best!.named, next!.named]).toEqual([true, false]);
-    expect(best!.speaksAgainst).toBe('Nothing found: the next best has 4 less.');
-    expect(next!.speaksFor).toBe('Evidence 96; 10 is enough for a name.');
+    expect(best!.speaksAgainst).toBe('Nothing; the next best has 4 less.');
+    expect(best!.speaksFor).toBe('Evidence 100; 10 is enough for a name.');
+    expect(next!.speaksFor).toBe('Evidence 96.');
     expect([best!.share, 0.9996, 0.0004, 0.05].map(shareText)).toEqual([
       '88 %',
       '> 99.9 %',
@@ -48,6 +50,21 @@ describe('candidates', () => {
 });
 
 const RAD = Math.PI / 180;
+
+it('with the answer the joints that are still red at times are named', () => {
+  const scene = (left: number) => ({
+    drift: {
+      joints: [1, 2],
+      step: 1,
+      duration: 9,
+      posture: [],
+      gap: [[], [0, left].map((one) => Array(10).fill(one))],
+    },
+    noise: [1, 1],
+  });
+  expect(closedWords(scene(0.9))).toContain('no joint is red any more');
+  expect(closedWords(scene(4))).toContain('joint 2 is still red at times');
+});
 
 it('the error shrinks on held-out traces where there are any, in degrees', () => {
   const gap = {

@@ -3,7 +3,7 @@
 import type { DiagnosisData, DiagnosisStep, Overlay, TriedEffect } from '../api/types';
 import { driftOf, heatAt, timesNoiseAt, type Drift } from '../hidden/drift';
 import { fixed, significant } from '../format';
-import { key, total } from './evidence';
+import { key, namedIn, total } from './evidence';
 import { shownUnit } from './overlay';
 
 export interface Told {
@@ -30,7 +30,7 @@ export function toldOf(
   if (best === undefined) return [];
   const weights = fitted.map((one) => Math.exp((total(one) - total(best)) / 2));
   const sum = weights.reduce((all, one) => all + one, 0);
-  const named = new Set([key({ effect: step.effect ?? '', joints: step.joints }), ...step.group.map(key)]);
+  const named = namedIn(step);
   return fitted.slice(0, most).map((one, place) => {
     const lead = total(best) - total(place === 0 ? (fitted[1] ?? one) : one);
     return {
@@ -41,7 +41,7 @@ export function toldOf(
       named: named.has(key(one)),
       speaksFor:
         total(one) > 0
-          ? `Evidence ${fixed(total(one), 0)}${needed === null ? '' : `; ${fixed(needed, 0)} is enough for a name`}.`
+          ? `Evidence ${fixed(total(one), 0)}${needed === null || place > 0 ? '' : `; ${fixed(needed, 0)} is enough for a name`}.`
           : 'Nothing: it explains less than its numbers cost.',
       speaksAgainst: against(one, fitted, place, lead),
     };
@@ -69,7 +69,7 @@ function against(one: TriedEffect, fitted: readonly TriedEffect[], place: number
   if (place === 0) {
     if (fitted.length < 2) return left ? `It ${left}.` : 'No other candidate was worth a fit.';
     const next = `the next best has ${fixed(lead, 0)} less`;
-    return left ? `It ${left}; ${next}.` : `Nothing found: ${next}.`;
+    return left ? `It ${left}; ${next}.` : `Nothing; ${next}.`;
   }
   const behind = lead < 1 ? 'As much evidence as the best' : `Evidence ${fixed(lead, 0)} below the best`;
   return left ? `${behind}, and ${left}.` : `${behind}.`;
@@ -85,6 +85,13 @@ export interface Shrunk {
   was: number;
   left: number;
   floor: number;
+}
+
+/** Of which simulation the errors of an answer are, where its steps were judged by another one; else empty. */
+export function measureWords(found: Pick<DiagnosisData, 'notes_data'>): string {
+  return found.notes_data?.some((one) => one.kind === 'errors-follow-record')
+    ? 'Errors of the closed loop alone; the percentages of the answer are of the mean square error in a simulation that follows the record.'
+    : '';
 }
 
 /** The error of each joint with the given and with the resulting model, and on which traces. */
@@ -144,15 +151,30 @@ export function scenesOf(found: Pick<DiagnosisData, 'signals' | 'efforts' | 'gap
 }
 
 /** Heat of each joint in `count` stretches of a scene, without (`closed` 0) and with (1) what was found. */
-export function heatOverTime(scene: Scene, count: number, closed: number): number[][] {
+export function heatOverTime(
+  scene: Pick<Scene, 'drift' | 'noise'>,
+  count: number,
+  closed: number,
+): number[][] {
   const heats = Array.from({ length: count }, (_, index) =>
     heatAt(scene.drift, scene.noise, ((index + 0.5) * scene.drift.duration) / count, closed),
   );
   return scene.drift.joints.map((_, joint) => heats.map((one) => one[joint]!));
 }
 
+/** Stretches of a record that are judged one by one. */
+export const BINS = 120;
 /** From this heat on a joint glows. */
 export const GLOWS = 0.3;
+
+/** How the arms move with the answer: alike, or which joints are still red at times. */
+export function closedWords(scene: Pick<Scene, 'drift' | 'noise'>): string {
+  const heats = heatOverTime(scene, BINS, 1);
+  const red = scene.drift.joints.filter((_, place) => heats[place]!.some((heat) => heat > GLOWS));
+  if (red.length === 0) return 'With the effect in the model the arms move alike: no joint is red any more.';
+  const joints = `joint${red.length > 1 ? 's' : ''} ${red.join(' and ')} ${red.length > 1 ? 'are' : 'is'}`;
+  return `With the effect in the model the arms move nearly alike: ${joints} still red at times.`;
+}
 
 /** The joints that an answer names; none where nothing was adopted. */
 export function answeredJoints(found: Pick<DiagnosisData, 'steps'>): number[] {

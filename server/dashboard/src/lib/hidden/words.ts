@@ -1,6 +1,6 @@
 /** What the demonstration says. Pure. */
 
-import type { Hidden, HiddenNumber } from '../api/types';
+import type { Hidden, HiddenNumber, Job } from '../api/types';
 import type { Tone } from '../jobs/jobs';
 import { sentence, significant } from '../format';
 
@@ -60,13 +60,22 @@ export function guessWords(
 }
 
 /** What goes on now, in one line. */
-export function stageWords(hidden: Hidden | null, hasDrift: boolean): string {
+export function stageWords(
+  hidden: Hidden | null,
+  hasDrift: boolean,
+  job: Pick<Job, 'state' | 'leading'> | null,
+): string {
   if (hidden === null) return '';
   if (hidden.state === 'failed') return sentence(`The search failed: ${hidden.problem}`);
   if (hidden.state === 'opened') return 'The secret is open.';
   if (hidden.trace === null) return 'The mock moves: 55 s of motion, recorded in lock-step in a few seconds.';
   if (hidden.state === 'recording') return 'A second motion is recorded, which the search will not see.';
-  return hasDrift
-    ? 'Which effect makes the arm differ from its model? Candidates are tried and fitted.'
-    : 'The model simulates the same motion.';
+  if (!hasDrift) return 'The model simulates the same motion.';
+  const now =
+    job?.state === 'done'
+      ? 'The answer is being read.'
+      : (job?.leading ?? []).length > 0
+        ? 'Candidates are tried and fitted.'
+        : 'The records are checked first.';
+  return `Which effect makes the arm differ from its model? ${now}`;
 }

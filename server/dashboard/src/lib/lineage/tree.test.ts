@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { Job, ModelEntry, ModelLineage } from '../api/types';
-import { lineageTree, shownRows, treeKey, type LineageNode } from './tree';
+import { jobTitle, lineageTree, shownRows, treeKey, type LineageNode } from './tree';
 
 const model = (id: string, parent: string | null, job: string | null): ModelEntry => ({
   id,
@@ -33,6 +33,12 @@ const lineage: ModelLineage = {
 };
 const drawn = (nodes: readonly LineageNode[]): unknown =>
   nodes.map((one) => (one.children.length === 0 ? one.key : [one.key, drawn(one.children)]));
+
+it('a fit is called by its name and what it looks for', () => {
+  const asked = { kind: 'fit', model: 'machine', held_out: [], name: 'cold', parameters: ['joint2.*'] };
+  expect(jobTitle(job('f', asked, null))).toBe('Fit: cold, joint2.*');
+  expect(jobTitle(job('f', { kind: 'fit', model: 'machine' }, null))).toBe('Fit');
+});
 
 describe('the tree of models', () => {
   const roots = lineageTree(lineage, 'arm');

@@ -72,7 +72,7 @@ export function lineageTree(found: ModelLineage, machineName: string): LineageNo
       key: `job ${job.id}`,
       kind: 'job',
       id: job.id,
-      label: jobName(job),
+      label: jobTitle(job),
       job,
       traces: job.request.traces,
       held: 'held_out' in job.request ? job.request.held_out : [],
@@ -130,6 +130,15 @@ export const JOB_NAMES: Record<Job['request']['kind'], string> = {
 /** What a job is: `Fit`. */
 export function jobName(job: Job): string {
   return JOB_NAMES[job.request.kind];
+}
+
+/** The same with what tells it from others of its kind: `Fit: friction, joint2.*`. */
+export function jobTitle(job: Job): string {
+  const own = [
+    'name' in job.request ? (job.request.name ?? '') : '',
+    'parameters' in job.request ? (job.request.parameters ?? []).join(' ') : '',
+  ].filter((text) => text !== '');
+  return own.length === 0 ? jobName(job) : `${jobName(job)}: ${own.join(', ')}`;
 }
 
 /** The lines that are shown: children of what is closed are not. */

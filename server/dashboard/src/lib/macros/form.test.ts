@@ -1,7 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import type { Macro } from '../api/types';
 import { givenIn } from '../console/completion';
-import { fieldsOf, valuesOf, withParameter } from './form';
+import { fieldsOf, unknownIn, valuesOf, withNamed, withParameter } from './form';
 
 const SCHEMA = {
   properties: {
@@ -43,6 +43,14 @@ describe('the form of a macro', () => {
 });
 
 describe('a parameter in place of a value', () => {
+  it('can be made of a name that was typed in braces', () => {
+    const typed = { ...MACRO, lines: ['run ramp --amplitude {amplitude} --joints {which}'] };
+    expect(unknownIn(typed)).toEqual(['amplitude', 'which']);
+    const made = withNamed(typed, 'amplitude');
+    expect(made.parameters[0]).toMatchObject({ name: 'amplitude', type: 'number', unit: '°', default: '' });
+    expect(unknownIn(made)).toEqual(['which']);
+  });
+
   it('takes its type, unit and default from the value, and a name that is free', () => {
     const first = withParameter(MACRO, 0, givenIn(MACRO.lines[0]!)[0]!);
     expect(first.lines[0]).toBe('run ramp --amplitude {amplitude} --joints 2');

@@ -64,6 +64,20 @@ export function valuesOf(
   return { values, problems };
 }
 
+/** Names in braces that lines have and no parameter is called. */
+export function unknownIn(macro: Pick<Macro, 'lines' | 'parameters'>): string[] {
+  const known = new Set(macro.parameters.map((one) => one.name));
+  const named = macro.lines.flatMap((line) =>
+    [...line.matchAll(/\{([a-z][a-z0-9_]*)\}/g)].map((one) => one[1]!),
+  );
+  return [...new Set(named)].filter((name) => !known.has(name));
+}
+
+/** The macro with a parameter of this name, whose default is still to be typed. */
+export function withNamed(macro: Macro, name: string): Macro {
+  return { ...macro, parameters: [...macro.parameters, parameterOf(name, name, '')] };
+}
+
 /** The macro with a parameter in place of a value of one of its lines. */
 export function withParameter(macro: Macro, line: number, given: Given): Macro {
   const taken = new Set(macro.parameters.map((one) => one.name));
@@ -74,20 +88,24 @@ export function withParameter(macro: Macro, line: number, given: Given): Macro {
     line,
     `${text.slice(0, given.at)}{${name}}${text.slice(given.at + given.value.length)}`,
   );
-  const number = Number(given.value);
-  const isNumber = given.value !== '' && Number.isFinite(number) && given.name !== 'joints';
-  const parameter = {
+  return { ...macro, lines, parameters: [...macro.parameters, parameterOf(name, given.name, given.value)] };
+}
+
+/** A parameter for a value of this option. Nothing yet is taken for a number where the option has a unit. */
+function parameterOf(name: string, option: string, value: string): Macro['parameters'][number] {
+  const number = Number(value);
+  const isNumber =
+    value === '' ? option in UNITS || WHOLE.has(option) : Number.isFinite(number) && option !== 'joints';
+  return {
     name,
     title: '',
-    unit: UNITS[given.name] ?? '',
-    type: isNumber ? ('number' as const) : ('text' as const),
-    default: isNumber ? number : given.value,
+    unit: UNITS[option] ?? '',
+    type: !isNumber ? 'text' : WHOLE.has(option) ? 'integer' : 'number',
+    default: isNumber && value !== '' ? number : value,
     minimum: null,
     maximum: null,
     choices: [],
   };
-  const whole = isNumber && WHOLE.has(given.name) ? { ...parameter, type: 'integer' as const } : parameter;
-  return { ...macro, lines, parameters: [...macro.parameters, whole] };
 }
 
 /** Units that the lines of `run` expect. */

@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { requestOf, type Filled } from './start';
+import { completedPatterns, requestOf, unmatched, type Filled } from './start';
 
 const filled: Filled = {
   model: 'abc',
@@ -10,6 +10,20 @@ const filled: Filled = {
   effects: ['backlash'],
   other: 'machine',
 };
+
+describe('patterns of parameters', () => {
+  const names = ['joint2.motor.torque_constant', 'link1.mass'];
+
+  it('that match nothing are named', () => {
+    expect(unmatched('joint2.*, *.mass joint2.foo link1.mas', names)).toEqual(['joint2.foo', 'link1.mas']);
+    expect(unmatched('link?.mass link[12].*', names)).toEqual([]);
+  });
+
+  it('are completed by what the model has', () => {
+    expect(completedPatterns('*.mass, joint2', names)).toEqual(['*.mass, joint2.motor.torque_constant']);
+    expect(completedPatterns('link1.mass', names)).toEqual([]);
+  });
+});
 
 describe('what was filled in', () => {
   it('becomes a fit with its effects and patterns', () => {

@@ -15,9 +15,32 @@ export interface Filled {
   other: string;
 }
 
+const parts = (text: string): string[] => text.split(/[\s,]+/).filter((part) => part !== '');
+
+/** Patterns that no parameter of the model matches: a fit would fail for them. Those with brackets are not judged. */
+export function unmatched(patterns: string, names: readonly string[]): string[] {
+  return parts(patterns).filter((pattern) => {
+    if (/[[\]]/.test(pattern)) return false;
+    const escaped = pattern
+      .replace(/[.+^${}()|\\]/g, '\\$&')
+      .replaceAll('*', '.*')
+      .replaceAll('?', '.');
+    return !names.some((name) => new RegExp(`^${escaped}$`).test(name));
+  });
+}
+
+/** Whole lines that complete the last pattern of a line. */
+export function completedPatterns(line: string, names: readonly string[]): string[] {
+  const start = /[^\s,]*$/.exec(line)!.index;
+  const begun = line.slice(start);
+  return names
+    .filter((name) => name.startsWith(begun) && name !== begun)
+    .map((name) => line.slice(0, start) + name);
+}
+
 /** The request; fields that were left empty are left to the service. */
 export function requestOf(kind: StartKind, filled: Filled): JobRequest {
-  const parameters = filled.patterns.split(/[\s,]+/).filter((part) => part !== '');
+  const parameters = parts(filled.patterns);
   const common = { traces: [...filled.traces] };
   const chosen = parameters.length === 0 ? {} : { parameters };
   switch (kind) {

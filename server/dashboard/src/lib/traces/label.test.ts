@@ -1,8 +1,16 @@
 import { describe, expect, it } from 'vitest';
 import { dayAndSecond } from '../format';
-import { isWhole, outcomeText, traceLabel } from './label';
+import { isWhole, noteFound, outcomeText, traceLabel } from './label';
 
 const created = '2026-11-21T10:22:05+00:00';
+
+it('shows the part of a note for which a search found its trace', () => {
+  const notes = `cold start\n${'a long line of what was done before '.repeat(2)}new Grease on joint 2`;
+  expect(noteFound(notes, 'grease')).toMatch(/^….*new Grease on joint 2$/);
+  expect(noteFound(notes, 'cold')).toBe('cold start');
+  expect(noteFound(notes, 'ramp')).toBe('');
+  expect(noteFound(notes, '')).toBe('');
+});
 
 describe('a trace to be chosen', () => {
   it('is called by its name and time, else by its kind', () => {

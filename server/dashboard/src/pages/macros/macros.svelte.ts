@@ -109,6 +109,12 @@ export class MacroDesk {
     this.done = '';
   }
 
+  /** What was typed in the editor; what was wrong before is no longer told. */
+  change(macro: Macro): void {
+    this.macro = macro;
+    this.problem = null;
+  }
+
   /** Begins a macro with the line of an experiment that has ended. */
   async editFrom(experiment: string): Promise<void> {
     await this.during(async () => {
