@@ -129,7 +129,8 @@ export const JOB_NAMES: Record<Job['request']['kind'], string> = {
 
 /** What a job is: `Fit`. */
 export function jobName(job: Job): string {
-  return JOB_NAMES[job.request.kind];
+  const name = 'name' in job.request ? (job.request.name ?? '') : '';
+  return JOB_NAMES[job.request.kind] + (name === '' ? '' : `: ${name}`);
 }
 
 /** The lines that are shown: children of what is closed are not. */
