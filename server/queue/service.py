@@ -255,7 +255,9 @@ class QueueService:
         if before is not None and before.paused:
             return before
         if waiting or interrupted:
-            line = f"the service was restarted with {waiting} waiting and {len(interrupted)} interrupted"
+            counts = {"waiting": waiting, "interrupted": len(interrupted)}
+            told = " and ".join(f"{count} {what}" for what, count in counts.items() if count)
+            line = f"the service was restarted with {told}"
             state = QueueState(True, f"{line}: look at the arm, then resume the queue", now)
         else:
             state = QueueState(False, "nothing was waiting when the service started", now)

@@ -187,7 +187,7 @@ def test_the_end_of_the_service_is_no_reason_to_find_the_queue_held(bench: Bench
 def test_a_service_that_begins_with_work_waiting_lets_nobody_begin_it_but_a_person(bench: Bench) -> None:
     bench.submit()
     bench.queue = bench.begun_anew()
-    line = "the service was restarted with 1 waiting and 0 interrupted"
+    line = "the service was restarted with 1 waiting"
     bench.queue.connection_made()
     bench.queue.start()
     assert bench.queue.status().reason == f"{line}: {LOOK}"

@@ -51,7 +51,7 @@ def test_a_run_that_the_last_service_left_is_told_when_the_next_begins(bench: Be
     queue = bench.begun_anew()
     ((event, actor, identity),) = bench.records
     assert (event.startswith("experiment: interrupted: "), actor, identity) == (True, None, made.id)
-    line = f"the service was restarted with 0 waiting and 1 interrupted: {LOOK}"
+    line = f"the service was restarted with 1 interrupted: {LOOK}"
     status = queue.status()
     assert (status.paused, status.reason, status.since) == (True, line, bench.clock.utc())
     assert bench.queues.get("ma2000").reason == line

@@ -31,7 +31,7 @@ export function notAnswered(): Problem {
     0,
     NOT_ANSWERED,
     'the service does not answer',
-    'is `daq serve` running, and the network up?',
+    'Check that “daq serve” runs on its computer, and the network.',
   );
 }
 

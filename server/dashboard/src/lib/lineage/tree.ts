@@ -129,16 +129,15 @@ export const JOB_NAMES: Record<Job['request']['kind'], string> = {
 
 /** What a job is: `Fit`. */
 export function jobName(job: Job): string {
-  return JOB_NAMES[job.request.kind];
+  const name = 'name' in job.request ? (job.request.name ?? '') : '';
+  return JOB_NAMES[job.request.kind] + (name === '' ? '' : `: ${name}`);
 }
 
 /** The same with what tells it from others of its kind: `Fit: friction, joint2.*`. */
 export function jobTitle(job: Job): string {
-  const own = [
-    'name' in job.request ? (job.request.name ?? '') : '',
-    'parameters' in job.request ? (job.request.parameters ?? []).join(' ') : '',
-  ].filter((text) => text !== '');
-  return own.length === 0 ? jobName(job) : `${jobName(job)}: ${own.join(', ')}`;
+  const name = jobName(job);
+  const sought = 'parameters' in job.request ? (job.request.parameters ?? []).join(' ') : '';
+  return sought === '' ? name : `${name}${name.includes(':') ? ',' : ':'} ${sought}`;
 }
 
 /** The lines that are shown: children of what is closed are not. */

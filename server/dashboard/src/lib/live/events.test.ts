@@ -1,7 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import type { QueueStatus, RobotMessage, ServiceEvent } from '../api/types';
 import { timeOfDay } from '../format';
-import { newestEvents, together, withPauser, withStopper } from './events';
+import { newestEvents, together, withPauser, withStopper, withYou } from './events';
 
 const event = (kind: string, at: string, actor: string | null = 'local'): ServiceEvent =>
   ({ kind, at, actor }) as ServiceEvent;
@@ -38,6 +38,15 @@ describe('who stopped the arm or paused the queue', () => {
     expect(withPauser(paused, [event('queue', LATER, 'anna')], you)?.reason).toBe(
       `anna paused it at ${timeOfDay(LATER)}`,
     );
+  });
+
+  it('is who cancelled the experiment, where the service ended it', () => {
+    const cause = 'by the service: the experiment was cancelled, or nobody had the control any more';
+    const text = "cancelled: cancelled by somebody at the service's computer";
+    const ended = { ...event('experiment', NOON, null), text };
+    expect(withStopper({ ...stopped, cause }, [ended], you)?.cause).toBe('cancelled by you');
+    expect(withStopper(stopped, [ended, event('stop', NOON)], you)?.cause).toBe(stop);
+    expect(withYou('cancelled by anna', you)).toBe('cancelled by anna');
   });
 
   it('is left to the service where nobody did through it', () => {

@@ -29,8 +29,22 @@ export function together<T>(rows: readonly T[], said: (row: T) => string): { row
   return found;
 }
 
+/** The service's name in its prose for those who need none. */
+const AT_SERVICE = "somebody at the service's computer";
+
+/** The reason of an end, with the name of whoever cancelled it as the person at this page reads it. */
+export function withYou(reason: string, who: Who): string {
+  return reason.replace(
+    /^cancelled by ([^.;:]+)/,
+    (_, name: string) => `cancelled by ${who(name === AT_SERVICE ? 'local' : name)}`,
+  );
+}
+
 const pressed = (event: ServiceEvent, who: Who): string =>
   `${who(event.actor!)} pressed STOP at ${timeOfDay(event.at)}`;
+
+/** Beginning of the cause of a stop by the service itself, which does not know there for which of two reasons. */
+const BY_SERVICE = 'by the service: the experiment was cancelled';
 
 /** The robot, with who stopped it where somebody did by the service. */
 export function withStopper(
@@ -39,7 +53,16 @@ export function withStopper(
   who: Who,
 ): RobotMessage | null {
   if (robot?.arm !== 'stopped') return robot;
-  const last = events.find((event) => event.kind === 'stop' || event.kind === 'reset');
+  const last = events.find(({ kind }) => kind === 'stop' || kind === 'reset' || kind === 'experiment');
+  if (last?.kind === 'experiment') {
+    const by = /: (cancelled by .*)$/.exec(last.text)?.[1];
+    if (by !== undefined && robot.cause.startsWith(BY_SERVICE)) return { ...robot, cause: withYou(by, who) };
+    return withStopper(
+      robot,
+      events.filter(({ kind }) => kind !== 'experiment'),
+      who,
+    );
+  }
   return last?.kind === 'stop' && last.actor != null ? { ...robot, cause: pressed(last, who) } : robot;
 }
 

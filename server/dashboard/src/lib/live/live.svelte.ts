@@ -10,6 +10,7 @@ import { asProblem, type Problem } from '../api/problem';
 import { spoken } from '../format';
 import { isMissing, LiveSocket, SILENT_AFTER, type Socket, type SocketState } from '../api/socket';
 import type {
+  Experiment,
   Job,
   LiveFrame,
   LiveMessage,
@@ -29,7 +30,7 @@ import { fleet } from '../fleet/fleet.svelte';
 import { stop } from '../stop/stop.svelte';
 import { ServiceClock, STALE_AFTER } from './age';
 import { asked, askSystem, newSocket } from './asked';
-import { newestEvents, withPauser, withStopper } from './events';
+import { newestEvents, withPauser, withStopper, withYou } from './events';
 import { SampleRate } from './rate';
 import { Recording } from './recording';
 
@@ -163,6 +164,11 @@ class Live {
   /** A name as the person at this page reads it. */
   who(name: string | null | undefined): string {
     return name == null ? 'unknown' : name === this.me?.name ? 'you' : spoken(name);
+  }
+
+  /** Why an experiment ended, as the person at this page reads it. */
+  reasonOf(ended: Experiment): string {
+    return withYou(ended.reason, (name) => this.who(name));
   }
 
   /** Time of day at the service, ms since 1970. Reactive: it grows. */

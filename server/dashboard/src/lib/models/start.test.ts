@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { completedPatterns, requestOf, unmatched, type Filled } from './start';
+import { namesFor, requestOf, unknownIn, type Filled } from './start';
 
 const filled: Filled = {
   model: 'abc',
@@ -10,20 +10,6 @@ const filled: Filled = {
   effects: ['backlash'],
   other: 'machine',
 };
-
-describe('patterns of parameters', () => {
-  const names = ['joint2.motor.torque_constant', 'link1.mass'];
-
-  it('that match nothing are named', () => {
-    expect(unmatched('joint2.*, *.mass joint2.foo link1.mas', names)).toEqual(['joint2.foo', 'link1.mas']);
-    expect(unmatched('link?.mass link[12].*', names)).toEqual([]);
-  });
-
-  it('are completed by what the model has', () => {
-    expect(completedPatterns('*.mass, joint2', names)).toEqual(['*.mass, joint2.motor.torque_constant']);
-    expect(completedPatterns('link1.mass', names)).toEqual([]);
-  });
-});
 
 describe('what was filled in', () => {
   it('becomes a fit with its effects and patterns', () => {
@@ -48,5 +34,21 @@ describe('what was filled in', () => {
     expect(requestOf('validate', filled)).not.toHaveProperty('held_out');
     expect(requestOf('compare', filled)).toMatchObject({ models: ['machine', 'abc'] });
     expect(requestOf('compare', { ...filled, other: 'abc' })).toMatchObject({ models: ['abc'] });
+  });
+});
+
+describe('names of parameters', () => {
+  const names = ['joint2.friction', 'joint2.stiffness', 'link1.mass'];
+
+  it('are refused before anything waits for them, with those that there are', () => {
+    expect(unknownIn('joint2.*, *.mass', names)).toBe('');
+    expect(unknownIn('joint2.foo', names)).toBe(
+      'no parameter is joint2.foo; there are joint2.friction, joint2.stiffness',
+    );
+    expect(unknownIn('foo', names)).toBe('no parameter is foo');
+  });
+
+  it('are completed behind those that stand there', () => {
+    expect(namesFor('*.mass, joint2.s', names)).toEqual(['*.mass, joint2.stiffness']);
   });
 });

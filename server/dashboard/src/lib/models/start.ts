@@ -15,32 +15,37 @@ export interface Filled {
   other: string;
 }
 
-const parts = (text: string): string[] => text.split(/[\s,]+/).filter((part) => part !== '');
+const partsOf = (patterns: string): string[] => patterns.split(/[\s,]+/).filter((part) => part !== '');
 
-/** Patterns that no parameter of the model matches: a fit would fail for them. Those with brackets are not judged. */
-export function unmatched(patterns: string, names: readonly string[]): string[] {
-  return parts(patterns).filter((pattern) => {
-    if (/[[\]]/.test(pattern)) return false;
-    const escaped = pattern
-      .replace(/[.+^${}()|\\]/g, '\\$&')
-      .replaceAll('*', '.*')
-      .replaceAll('?', '.');
-    return !names.some((name) => new RegExp(`^${escaped}$`).test(name));
-  });
+/** Which of the patterns no parameter has, and what there is instead; empty where all are known. */
+export function unknownIn(patterns: string, names: readonly string[]): string {
+  const wrong = partsOf(patterns).find((part) => !names.some((name) => matches(part, name)));
+  if (wrong === undefined || names.length === 0) return '';
+  const head = `${wrong.split('.')[0]}.`;
+  const near = names.filter((name) => name.startsWith(head)).slice(0, MOST_NEAR);
+  return `no parameter is ${wrong}${near.length > 0 ? `; there are ${near.join(', ')}` : ''}`;
 }
 
-/** Whole lines that complete the last pattern of a line. */
-export function completedPatterns(line: string, names: readonly string[]): string[] {
-  const start = /[^\s,]*$/.exec(line)!.index;
-  const begun = line.slice(start);
-  return names
-    .filter((name) => name.startsWith(begun) && name !== begun)
-    .map((name) => line.slice(0, start) + name);
+/** Lines that the line may become: its last word completed. */
+export function namesFor(patterns: string, names: readonly string[]): string[] {
+  const last = /[^\s,]*$/.exec(patterns)![0];
+  const before = patterns.slice(0, patterns.length - last.length);
+  return names.filter((name) => name.startsWith(last)).map((name) => before + name);
+}
+
+const MOST_NEAR = 8;
+
+/** Whether a name is that of a pattern, with `*` for anything and `?` for one letter. */
+function matches(pattern: string, name: string): boolean {
+  // Sets of letters are left to the service.
+  if (pattern.includes('[')) return true;
+  const escaped = pattern.replace(/[.+^${}()|\]\\]/g, '\\$&');
+  return new RegExp(`^${escaped.replaceAll('*', '.*').replaceAll('?', '.')}$`).test(name);
 }
 
 /** The request; fields that were left empty are left to the service. */
 export function requestOf(kind: StartKind, filled: Filled): JobRequest {
-  const parameters = parts(filled.patterns);
+  const parameters = partsOf(filled.patterns);
   const common = { traces: [...filled.traces] };
   const chosen = parameters.length === 0 ? {} : { parameters };
   switch (kind) {

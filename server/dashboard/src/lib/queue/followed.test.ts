@@ -10,7 +10,10 @@ describe('the run that was just sent', () => {
     const waiting = [one('a'), one('b')];
     expect(standingOf('a', { ...nothing, waiting })).toMatchObject({ state: 'waiting', said: 'It is next.' });
     const behind = standingOf('b', { ...nothing, waiting, running: one('c', 'running') });
-    expect(behind).toMatchObject({ text: 'number 2 in the queue', said: 'It runs after 2 others.' });
+    expect(behind).toMatchObject({
+      text: 'number 2 in the queue',
+      said: 'It runs after the one that is running and one that waits.',
+    });
   });
 
   it('runs, and ends as it ended', () => {

@@ -34,13 +34,16 @@ export function standingOf(id: string, { waiting, running, ended }: Lists): Stan
   const place = waiting.findIndex((one) => one.id === id);
   if (place === -1)
     return { state: 'unknown', experiment: null, tone: 'quiet', text: 'added to the queue', said: '' };
-  const ahead = place + (running === null ? 0 : 1);
+  const ahead = [
+    ...(running === null ? [] : ['the one that is running']),
+    ...(place === 0 ? [] : [place === 1 ? 'one that waits' : `${place} that wait`]),
+  ];
   return {
     state: 'waiting',
     experiment: waiting[place]!,
     tone: 'quiet',
-    text: `number ${place + 1} in the queue`,
-    said: ahead === 0 ? 'It is next.' : `It runs after ${ahead === 1 ? 'one other' : `${ahead} others`}.`,
+    text: place === 0 ? 'next in the queue' : `number ${place + 1} in the queue`,
+    said: ahead.length === 0 ? 'It is next.' : `It runs after ${ahead.join(' and ')}.`,
   };
 }
 

@@ -21,7 +21,7 @@ export const STOPS: readonly Stop[] = [
   {
     title: 'What you see is live',
     text: 'The charts show position, error and drive of each joint as they come. Arrange the panels as you like them.',
-    about: '[data-kind="charts"], [data-kind="chart"], .panels',
+    about: '[data-kind="charts"], [data-kind="chart"]',
   },
   {
     title: 'Every run leaves a trace',
