@@ -23,6 +23,8 @@ Execute = Callable[[str], Iterable[Sequence[Any]]]
 VERSION = "alembic_version"
 """The table with the number of the core's last migration."""
 _VERSION_TABLE = """CREATE TABLE {0} (version_num VARCHAR(32) NOT NULL, CONSTRAINT {0}_pkc PRIMARY KEY (version_num))"""
+ORDER = ("trigger", "view", "index", "table")
+"""The order in which objects can be removed."""
 
 
 class UnknownRevisionError(Exception):
@@ -44,15 +46,16 @@ def _numbered(package: str) -> dict[str, str]:
     return {name.partition("_")[0]: f"{package}.{name}" for name in names}
 
 
-def upgrade(connection: Connection) -> None:
-    """Migrates the tables to the newest revisions. Raises UnknownRevisionError."""
+def upgrade(connection: Connection, revisions: Mapping[str, str] | None = None) -> None:
+    """Migrates the tables to these revisions; without any, to the newest. Raises UnknownRevisionError."""
     there = set(inspect(connection).get_table_names())
     for table, modules in migrations().items():
-        last = next(reversed(modules))
+        last = next(reversed(modules)) if revisions is None else revisions.get(table, "")
         found = connection.execute(text(f"SELECT version_num FROM {table}")).scalar() if table in there else None
-        if (found or last) not in modules:
-            raise UnknownRevisionError(f"{table} {found}: tables of another version")
-        due = [revision for revision in modules if (found or "") < revision]
+        for revision in {last, found or last} - {""}:
+            if revision not in modules:
+                raise UnknownRevisionError(f"{table} {revision}: tables of another version")
+        due = [revision for revision in modules if (found or "") < revision <= last]
         for revision in due:
             import_module(modules[revision]).upgrade(connection)
         if due and table not in there:
@@ -63,10 +66,18 @@ def upgrade(connection: Connection) -> None:
             connection.execute(text(f"UPDATE {table} SET version_num = :last"), {"last": last})
 
 
-def expected_schema() -> Schema:
-    """Returns the schema of a SQLite database with this program's tables."""
+def revisions_of(execute: Execute) -> dict[str, str]:
+    """Returns the revisions of a SQLite database by their tables; `execute` carries out statements on it."""
+    there = {row[0] for row in execute("SELECT name FROM sqlite_master")}
+    kept = [table for table in migrations() if table in there]
+    return {table: str(row[0]) for table in kept for row in execute(f"SELECT version_num FROM {table}")}
+
+
+def expected_schema(revisions: Mapping[str, str] | None = None) -> Schema:
+    """Returns the schema of a SQLite database with tables of these revisions; without any, of the newest. Raises
+    UnknownRevisionError."""
     with create_engine("sqlite://").connect() as connection:
-        upgrade(connection)
+        upgrade(connection, revisions)
         return schema_of(connection.exec_driver_sql)
 
 
@@ -95,6 +106,16 @@ def difference(found: Schema, expected: Schema) -> str | None:
         if there != (columns, form):
             return f"{kind} {name} is not as this program makes it"
     return None
+
+
+def foreign(found: Schema, expected: Schema) -> list[tuple[str, str]]:
+    """Returns kind and name of each unexpected object, in an order in which they can be removed."""
+    return sorted(set(found) - set(expected), key=lambda one: (ORDER.index(one[0]), one[1]))
+
+
+def remove(execute: Callable[[str], object], kind: str, name: str) -> None:
+    """Removes an object from a SQLite database."""
+    execute(f'DROP {kind} IF EXISTS "{name.replace(chr(34), chr(34) * 2)}"')
 
 
 def _text(name: str) -> str:

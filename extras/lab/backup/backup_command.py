@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
-from zipfile import ZipInfo
 
 import typer
 
-from daq_cli.app.context import JsonOption, invocation, print_json
+from daq_cli.app.context import JsonOption, console, invocation, print_json
 
 app = typer.Typer(add_completion=False)
 
@@ -22,18 +20,17 @@ def backup(
 ) -> None:
     """Copy the service's database, traces, models and results into one file, also while the service runs."""
     from daq_cli.app.progress import shown_progress
-    from extras.lab.backup.archive import back_up, places_of, verify
+    from extras.lab.backup.places import places_of
+    from extras.lab.backup.write import back_up
+    from server.clock import SystemClock
 
+    places = places_of(invocation(context).configuration)
     with shown_progress("backup") as progress:
-        back_up(places_of(invocation(context).configuration), file, progress)
-    found = counted(verify(file))
+        made = back_up(places, file, SystemClock().utc(), progress)
     if json:
-        print_json({"file": file, **found})
+        counted = {"bytes": made.size, "traces": made.count("traces"), "models": made.count("models")}
+        print_json({"file": file, **made.model_dump(mode="json", exclude={"files"}), **counted})
         return
-    print(f"{file}: {found['traces']} traces, {found['models']} models, {found['bytes'] / 1e6:.1f} MB")
-
-
-def counted(entries: Sequence[ZipInfo]) -> dict[str, int]:
-    """Returns the size of a backup's files (bytes), and the numbers of its traces and models."""
-    kinds = {kind: sum(entry.filename.startswith(f"{kind}/") for entry in entries) for kind in ("traces", "models")}
-    return {"bytes": sum(entry.file_size for entry in entries), **kinds}
+    for name in made.left_out:
+        console().print(f"left out, deleted meanwhile: {name}", markup=False)
+    print(f"{file}: {made.count('traces')} traces, {made.count('models')} models, {made.size / 1e6:.1f} MB")

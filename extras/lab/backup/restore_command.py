@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from daq.contracts.errors import SpecError
 from daq_cli.app.context import JsonOption, console, invocation, print_json
 
 app = typer.Typer(add_completion=False)
@@ -24,23 +25,35 @@ def restore(
 ) -> None:
     """Restore the database, traces, models and results of a backup. The service must not run."""
     from daq_cli.app.progress import shown_progress
-    from extras.lab.backup.archive import places_of, verify
-    from extras.lab.backup.archive import restore as bring_back
-    from extras.lab.backup.backup_command import counted
+    from extras.lab.backup.manifest import verify
+    from extras.lab.backup.places import places_of
+    from extras.lab.backup.restore import restore as bring_back
     from server.clock import SystemClock
 
-    put_aside: tuple[Path, ...] = ()
+    if file.exists() and not file.is_file():
+        raise SpecError(f"{file}: is not a file, so not a backup")
+    put_aside: list[str] = []
+    removed: tuple[str, ...] = ()
     if check:
-        entries, what = verify(file), "is as it was written"
+        with shown_progress("checking") as progress:
+            found = verify(file, progress)
+        what = "is as it was written"
     else:
         places = places_of(invocation(context).configuration)
         with shown_progress("restore") as progress:
-            entries, put_aside = bring_back(file, places, SystemClock().utc(), progress, overwrite=overwrite)
-        what = "was restored"
-    found = counted(entries)
+            done = bring_back(file, places, SystemClock().utc(), progress, overwrite=overwrite)
+        put_aside, removed = [str(folder) for folder in done.put_aside], done.removed
+        found, what = done.manifest, "was restored"
     if json:
-        print_json({"file": file, "restored": not check, "put_aside": [str(one) for one in put_aside], **found})
+        counted = {"bytes": found.size, "traces": found.count("traces"), "models": found.count("models")}
+        manifest = found.model_dump(mode="json", exclude={"files"})
+        print_json(
+            {"file": file, "restored": not check, "put_aside": put_aside, "removed": removed, **manifest, **counted}
+        )
         return
     for folder in put_aside:
         console().print(f"existing data were moved to {folder}", markup=False)
-    print(f"{file} {what}: {found['traces']} traces, {found['models']} models, {found['bytes'] / 1e6:.1f} MB")
+    for name in removed:
+        console().print(f"not restored, since this program does not make it: {name} of the database", markup=False)
+    counts = f"{found.count('traces')} traces, {found.count('models')} models, {found.size / 1e6:.1f} MB"
+    print(f"{file} of {found.created:%Y-%m-%d %H:%M:%S %Z} {what}: {counts}")

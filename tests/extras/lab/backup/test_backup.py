@@ -1,12 +1,16 @@
 """Backup and restore: true while a service writes, and nothing touched unless all of it is as it was written."""
 
+import hashlib
+import json
 import shutil
 import sqlite3
 import threading
 import zipfile
+from collections.abc import Callable
 from contextlib import closing
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -18,12 +22,17 @@ from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import load_machine
 from daq.contracts.service.experiments import ExperimentRequest
 from daq.teaching.program import Absolute, Program
-from extras.lab.backup.archive import DATABASE, Places, back_up, restore, verify
+from extras.lab.backup.database import revision_of
+from extras.lab.backup.manifest import MANIFEST, verify
+from extras.lab.backup.places import DATABASE, Places
+from extras.lab.backup.restore import restore
+from extras.lab.backup.write import back_up
 from server.experiments.review import Given, Review
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.programs import ProgramStore
 from server.store.queues import QueueState, QueueStore
+from server.store.schema import VERSION, migrations
 from server.store.tables import TraceRow
 from server.store.traces import TraceStore
 from tests.daq_cli.invoke import CommandLine
@@ -70,7 +79,8 @@ def filled(folder: Path) -> Places:
     job = places.service / "jobs" / "0123456789ab"
     job.mkdir(parents=True)
     (job / "result.json").write_text('{"found": 1}')
-    (job / "request.json").write_text("{}")
+    task = {"request": {"kind": "fit"}, "traces": {"aaa": str(places.traces["ma2000"] / "aaa.mcap")}, "models": {}}
+    (job / "request.json").write_text(json.dumps(task))
     (job / "cancel").touch()
     return places
 
@@ -91,19 +101,21 @@ def traces_in(places: Places) -> list[str]:
 @pytest.fixture
 def archive(tmp_path: Path) -> Path:
     path = tmp_path / "arm.zip"
-    back_up(filled(tmp_path / "here"), path, quietly)
+    back_up(filled(tmp_path / "here"), path, NOW, quietly)
     return path
 
 
 def test_everything_comes_back_elsewhere_as_it_was(archive: Path, tmp_path: Path) -> None:
     places = places_in(tmp_path / "there")
-    _, put_aside = restore(archive, places, NOW, quietly)
-    assert put_aside == ()
+    restored = restore(archive, places, NOW, quietly)
+    assert restored.put_aside == ()
     assert traces_in(places) == ["aaa.mcap", "bbb.mcap"]
     before, after = everything(tmp_path / "here"), everything(tmp_path / "there")
     assert set(before) - set(after) == {"traces/ccc.mcap.part", "service/jobs/0123456789ab/cancel"}
-    del after["service/service.sqlite"]
-    assert after == {name: before[name] for name in after}
+    changed = {"service/service.sqlite", "service/jobs/0123456789ab/request.json"}
+    assert {name: after[name] for name in set(after) - changed} == {name: before[name] for name in set(after) - changed}
+    task = json.loads(after["service/jobs/0123456789ab/request.json"])
+    assert task["traces"] == {"aaa": str(places.traces["ma2000"] / "aaa.mcap")}
     with closing(Store(places.database)) as store:
         store.migrate()
         assert ExperimentStore(store).count_waiting("ma2000") == 1
@@ -116,7 +128,7 @@ def test_the_queue_comes_back_paused(tmp_path: Path, before: QueueState | None) 
     with closing(Store(here.database)) as store:
         if before is not None:
             QueueStore(store).set("ma2000", before)
-    back_up(here, tmp_path / "arm.zip", quietly)
+    back_up(here, tmp_path / "arm.zip", NOW, quietly)
     restore(tmp_path / "arm.zip", there, later, quietly)
     with closing(Store(there.database)) as store:
         line = "restored from a backup: look at the arm, then resume the queue"
@@ -131,7 +143,7 @@ def test_what_may_have_ended_since_does_not_come_back(tmp_path: Path) -> None:
         made, _ = experiments.submit("ma2000", ExperimentRequest(spec=SPEC), NOW, "anna")
         content = review.content(experiments.get("ma2000", made.id).content)
         experiments.approve("ma2000", made.id, review, Given(content, "bert", False), NOW)
-    back_up(here, tmp_path / "arm.zip", quietly)
+    back_up(here, tmp_path / "arm.zip", NOW, quietly)
     restore(tmp_path / "arm.zip", there, NOW + timedelta(days=1), quietly)
     with closing(Store(there.database)) as store:
         assert ExperimentStore(store).get("ma2000", made.id).approval is None
@@ -140,8 +152,8 @@ def test_what_may_have_ended_since_does_not_come_back(tmp_path: Path) -> None:
 def test_a_backup_is_for_nobody_else_to_read_and_never_written_over(archive: Path, tmp_path: Path) -> None:
     assert archive.stat().st_mode & 0o077 == 0
     with pytest.raises(SpecError, match="already exists"):
-        back_up(places_in(tmp_path / "here"), archive, quietly)
-    assert sum(entry.filename.startswith("traces/") for entry in verify(archive)) == 2
+        back_up(places_in(tmp_path / "here"), archive, NOW, quietly)
+    assert verify(archive).count("traces") == 2
 
 
 def test_what_a_backup_names_is_in_it_however_much_is_written_meanwhile(tmp_path: Path) -> None:
@@ -159,7 +171,7 @@ def test_what_a_backup_names_is_in_it_however_much_is_written_meanwhile(tmp_path
     writer.start()
     try:
         for number in range(5):
-            back_up(places, tmp_path / f"{number}.zip", quietly)
+            back_up(places, tmp_path / f"{number}.zip", NOW, quietly)
     finally:
         ended.set()
         writer.join()
@@ -178,52 +190,136 @@ def test_nothing_is_written_over_unless_asked_for_and_then_it_is_put_aside(archi
     with pytest.raises(SpecError, match=r"already exist .*: with --overwrite they are moved aside"):
         restore(archive, places, NOW, quietly)
     assert everything(tmp_path / "there") == before
-    _, put_aside = restore(archive, places, NOW, quietly, overwrite=True)
+    restored = restore(archive, places, NOW, quietly, overwrite=True)
     after = everything(tmp_path / "there")
     assert after["traces/aaa.mcap"] == everything(tmp_path / "here")["traces/aaa.mcap"]
     assert after["traces/before-restore-2026-01-01T12-00-00Z/aaa.mcap"] == b"another trace of this number"
-    assert set(put_aside) == {
+    assert set(restored.put_aside) == {
         places.traces["ma2000"] / "before-restore-2026-01-01T12-00-00Z",
         places.service / "before-restore-2026-01-01T12-00-00Z",
     }
     assert sorted(before.values()) == sorted(data for name, data in after.items() if "before-restore" in name)
 
 
-WRONG: dict[str, dict[str, bytes]] = {
-    "another robot's": {"traces/other/aaa.mcap": b"trace"},
-    "a path out of it": {"../../evil.mcap": b"trace"},
-    "no database": {},
-    "a database of something else": {DATABASE: b"SQLite format 3\0"},
+Files, Listed = dict[str, bytes], dict[str, Any]
+
+
+def _other_bytes(files: Files, _listed: Listed) -> None:
+    files["traces/bbb.mcap"] = files["traces/bbb.mcap"].replace(b"bbb", b"xxx")
+
+
+def _path_out_of_it(files: Files, listed: Listed) -> None:
+    files["../../evil.mcap"] = files.pop("traces/bbb.mcap")
+    listed["files"][2]["name"] = "../../evil.mcap"
+
+
+def _no_database(files: Files, listed: Listed) -> None:
+    del files[DATABASE]
+    listed["files"] = [entry for entry in listed["files"] if entry["name"] != DATABASE]
+
+
+WRONG: dict[str, Callable[[Files, Listed], object]] = {
+    "a file is missing": lambda files, _: files.pop("traces/bbb.mcap"),
+    "a file has other bytes": _other_bytes,
+    "a file too many": lambda files, _: files.update({"traces/ddd.mcap": b"whence?"}),
+    "another robot's": lambda _, listed: listed.update(robot="other"),
+    "a newer format": lambda _, listed: listed.update(format=2),
+    "newer tables": lambda _, listed: listed.update(revision="9999"),
+    "a path out of it": _path_out_of_it,
+    "no list": lambda files, _: files.pop(MANIFEST),
+    "no database": _no_database,
 }
 
 
-@pytest.mark.parametrize("change", WRONG.values(), ids=WRONG)
-def test_what_is_not_a_backup_of_this_robot_is_refused_before_anything_is_touched(
-    archive: Path, tmp_path: Path, change: dict[str, bytes]
-) -> None:
-    places = filled(tmp_path / "there")
+def _changed(archive: Path, change: Callable[[Files, Listed], object]) -> None:
+    """Writes the backup again with something wrong in it, all checksums of the ZIP file right."""
     with zipfile.ZipFile(archive) as pack:
         files = {name: pack.read(name) for name in pack.namelist()}
-    if not change:
-        del files[DATABASE]
+    manifest = json.loads(files[MANIFEST])
+    change(files, manifest)
+    if MANIFEST in files:
+        files[MANIFEST] = json.dumps(manifest).encode()
     with zipfile.ZipFile(archive, "w") as pack:
-        for name, data in (files | change).items():
+        for name, data in files.items():
             pack.writestr(name, data)
+
+
+@pytest.mark.parametrize("change", WRONG.values(), ids=WRONG)
+def test_what_is_not_a_whole_backup_of_this_robot_is_refused_before_anything_is_touched(
+    archive: Path, tmp_path: Path, change: Callable[[Files, Listed], object]
+) -> None:
+    places = filled(tmp_path / "there")
     before = everything(tmp_path)
+    _changed(archive, change)
+    before["arm.zip"] = archive.read_bytes()
     with pytest.raises(SpecError) as refused:
         restore(archive, places, NOW, quietly, overwrite=True)
     assert "\n" not in str(refused.value)
     assert everything(tmp_path) == before
 
 
-def test_tables_of_another_version_are_refused(tmp_path: Path) -> None:
-    here = filled(tmp_path / "here")
-    with closing(sqlite3.connect(here.database)) as connection, connection:
-        connection.execute("UPDATE alembic_version SET version_num = '9999'")
-    back_up(here, tmp_path / "arm.zip", quietly)
-    with pytest.raises(SpecError, match=r"of another version \(9999\)"):
-        restore(tmp_path / "arm.zip", places_in(tmp_path / "there"), NOW, quietly)
+def _repacked(archive: Path, *statements: str, **files: bytes) -> None:
+    """Writes a whole backup anew, with another database and other requests of jobs."""
+    with zipfile.ZipFile(archive) as pack:
+        there = {name: pack.read(name) for name in pack.namelist()}
+    database = archive.with_suffix(".sqlite")
+    database.write_bytes(there[DATABASE])
+    with closing(sqlite3.connect(database)) as connection, connection:
+        connection.executescript(";".join(statements))
+    there |= {DATABASE: database.read_bytes(), **files}
+    database.unlink()
+    manifest = json.loads(there[MANIFEST])
+    for entry in manifest["files"]:
+        data = there[entry["name"]]
+        entry |= {"size": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+    there[MANIFEST] = json.dumps(manifest).encode()
+    with zipfile.ZipFile(archive, "w") as pack:
+        for name, data in there.items():
+            pack.writestr(name, data)
+
+
+@pytest.mark.parametrize(
+    ("statements", "why"),
+    [
+        (["DROP TABLE audit"], "table audit is missing"),
+        (["ALTER TABLE audit DROP COLUMN count"], "table audit has no column count"),
+        (
+            [
+                "CREATE TABLE other AS SELECT * FROM audit",
+                "DROP TABLE audit",
+                "CREATE VIEW audit AS SELECT * FROM other",
+            ],
+            "table audit is missing",
+        ),
+        (["DROP TRIGGER audit_update"], "trigger audit_update is missing"),
+        (
+            ["DROP TRIGGER audit_update", "CREATE TRIGGER audit_update BEFORE UPDATE ON audit BEGIN SELECT 1; END"],
+            "trigger audit_update is not as this program makes it",
+        ),
+    ],
+)
+def test_a_backup_whose_tables_are_not_this_programs_is_refused(
+    archive: Path, tmp_path: Path, statements: list[str], why: str
+) -> None:
+    _repacked(archive, *statements)
+    with pytest.raises(SpecError, match=why):
+        restore(archive, places_in(tmp_path / "there"), NOW, quietly)
     assert everything(tmp_path / "there") == {}
+
+
+def test_what_a_backups_database_has_beside_this_programs_tables_is_not_brought_back(
+    archive: Path, tmp_path: Path
+) -> None:
+    spy = "CREATE TRIGGER spy AFTER UPDATE ON queues BEGIN DELETE FROM experiments; END"
+    view, table = "CREATE VIEW seen AS SELECT * FROM tokens", 'CREATE TABLE "of ""others""" (x)'
+    _repacked(archive, spy, table, view, **{"jobs/0123456789ab/request.json": b"[]"})
+    there = places_in(tmp_path / "there")
+    done = restore(archive, there, NOW, quietly)
+    assert done.removed == ("trigger spy", "view seen", 'table of "others"')
+    with closing(Store(there.database)) as store:
+        store.require_sound()
+        assert ExperimentStore(store).count_waiting("ma2000") == 1, "the trigger did not act while the queue was paused"
+    assert (there.service / "jobs" / "0123456789ab" / "request.json").read_text() == "[]", "no worker accepts it"
 
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -251,8 +347,8 @@ def test_a_flipped_bit_or_a_cut_is_refused_or_harmless(
 
 
 def test_a_disk_that_fills_up_leaves_no_half_backup_and_no_half_restore(archive: Path, tmp_path: Path) -> None:
-    with pytest.raises(SpecError, match="MB are needed"):
-        back_up(places_in(tmp_path / "here"), tmp_path / "second.zip", quietly, reserve=1 << 60)
+    with pytest.raises(SpecError, match="are free, a backup needs"):
+        back_up(places_in(tmp_path / "here"), tmp_path / "second.zip", NOW, quietly, reserve=1 << 60)
     with pytest.raises(SpecError, match="are needed"):
         restore(archive, places_in(tmp_path / "there"), NOW, quietly, reserve=1 << 60)
     assert not (tmp_path / "second.zip").exists()
@@ -316,12 +412,27 @@ def test_several_robots_come_back_each_into_its_own_folder(tmp_path: Path) -> No
         store.migrate()
         for number, robot in (("aaa", "left"), ("bbb", "right")):
             add_trace(store, here, number, robot)
-    back_up(here, tmp_path / "arms.zip", quietly)
-    with pytest.raises(SpecError, match="has traces of left, right; this configuration is for ma2000"):
+    job = here.service / "jobs" / "0123456789ab"
+    job.mkdir(parents=True)
+    files = {"bbb": str(here.traces["right"] / "bbb.mcap")}
+    task = {"request": {"kind": "fit"}, "traces": files, "models": {}}
+    (job / "request.json").write_text(json.dumps(task))
+    back_up(here, tmp_path / "arms.zip", NOW, quietly)
+    with pytest.raises(SpecError, match="is of robot 'left, right'; this configuration is for 'ma2000'"):
         restore(tmp_path / "arms.zip", places_in(tmp_path / "one"), NOW, quietly)
     restore(tmp_path / "arms.zip", there, NOW, quietly)
     assert [path.name for path in there.traces["left"].glob("*.mcap")] == ["aaa.mcap"]
     assert [path.name for path in there.traces["right"].glob("*.mcap")] == ["bbb.mcap"]
+    found = json.loads((there.service / "jobs" / "0123456789ab" / "request.json").read_text())
+    assert found["traces"] == {"bbb": str(there.traces["right"] / "bbb.mcap")}
     with closing(Store(there.database)) as store:
         states = [QueueStore(store).get(robot) for robot in ("left", "right")]
     assert all(state is not None and state.paused for state in states)
+
+
+@pytest.mark.parametrize("name", ["why?", "a%41b", "50%", "a#b", "x?mode=memory&y", "ü :@"])
+def test_a_database_is_read_whatever_its_folder_is_called(tmp_path: Path, name: str) -> None:
+    places = places_in(tmp_path / name)
+    with closing(Store(places.database)) as store:
+        store.migrate()
+    assert revision_of(places.database) == max(migrations()[VERSION])
