@@ -190,7 +190,7 @@ def _disconnected(service: Service) -> None:
     assert (answer.status_code, answer.json()["type"]) == (503, "/api/v1/problems#not-reached")
     assert service.until_connected()["connection"] == "connected"
     queue = service.robot.get("/queue").json()
-    assert (queue["paused"], queue["reason"].partition(" (")[0]) == (True, "the connection to the robot has ended")
+    assert (queue["paused"], queue["reason"].partition(": ")[0]) == (True, "the connection to the robot has ended")
     assert service.robot.post("/queue/resume", json={}).status_code == 200
 
 
