@@ -147,7 +147,7 @@ def test_a_reset_ends_the_stop_and_moves_nothing(dashboard: Dashboard) -> None:
     page.get_by_role("button", name="Reset").focus()
     page.keyboard.press("Enter")
     expect(page.get_by_text("The arm is stopped.")).not_to_be_attached()
-    expect(page.get_by_text("The arm is reset and holds")).to_be_focused()  # which a key does nothing to
+    expect(page.locator("[data-banner=reset] p")).to_be_focused()  # which a key does nothing to
     state = dashboard.mock.ask("state")
     assert not state["frozen"]
     assert all(abs(one - other) <= 2 for one, other in zip(before, state["set_points"], strict=True))
