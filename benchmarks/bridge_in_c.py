@@ -31,8 +31,7 @@ from tests.firmware.hosted_link import HostedLink
 from tests.firmware.mega_link import MegaLink, board_on_the_bus
 
 BAUD = 115_200
-STOP_BYTES = 9
-LINE_US = STOP_BYTES * 10_000_000 // BAUD
+LINE_US = 9 * 10_000_000 // BAUD  # a stop's frame has nine bytes
 PERIOD_US = 20_000
 STEP_US = 200
 JOINTS = 0b000111
