@@ -98,8 +98,8 @@ def rates_tried(observation: Observation, name: str, joint: int) -> Floats:
 
 
 def _alike(observation: Observation, over: Tone, column: int) -> float:
-    """Distance of two rates that the records can just distinguish: one over the travel of a joint (index), or over the
-    duration. Infinite for a joint at rest."""
+    """Distance of two rates that the records can just distinguish: a wave over the travel of a joint (index), in rad of
+    phase per rad (m), or one over the duration, in Hz. Infinite for a joint at rest."""
     if over is Tone.OVER_TIME:
         return 1 / max(len(r.inputs) * r.inputs.period for r in observation.records)
     travel = max(float(np.ptp(r.measured[:, column])) for r in observation.records)
