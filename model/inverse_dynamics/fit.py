@@ -321,5 +321,5 @@ class TorqueProblem:
         residual = self.balance.residual(named)
         if not derivatives:
             return [Evaluation(r, None) for r in residual]
-        slopes = [self.balance.slope(named, residual, u) for u in self.unknowns]
+        slopes = self.balance.slopes(named, self.unknowns)
         return [Evaluation(r, np.stack([slope[i] for slope in slopes])) for i, r in enumerate(residual)]

@@ -53,7 +53,12 @@ def friction_at_rest(level: Floats, motion: LinkMotion, joints: Floats) -> Resti
 
 
 def subtract_held(left: Floats, friction: RestingFriction, record: RecordedMotion) -> Floats:
-    """Subtracts from residual torque (k, n) the friction of joints at rest or at a reversal.
+    """Subtracts from residual torque (k, n) the friction of joints at rest or at a reversal (`held_friction`)."""
+    return subtract_friction(left, friction, record, held_friction(left, friction, record))
+
+
+def held_friction(left: Floats, friction: RestingFriction, record: RecordedMotion) -> Floats:
+    """Returns the friction (k, n) of joints at rest or at a reversal, for a residual torque (k, n); used there alone.
 
     There friction takes any torque that holds the joint, with a mean up to its level, in place of a share that follows
     the speed. The mean is over the whole passage. Sample by sample, friction would take the noise within its level and
@@ -61,13 +66,27 @@ def subtract_held(left: Floats, friction: RestingFriction, record: RecordedMotio
     below the cutoff, as far as its level allows.
     """
     if not record.turns.any():
-        return left
+        return np.zeros_like(left)
     low, high = friction.lowest, friction.highest
     asked = record.mean_in_turn(left + friction.sliding)
-    held = np.where(record.turns, asked - np.clip(asked, low, high), left)
+    taken = np.clip(asked, low, high)
     for _ in range(HOLDING_ROUNDS if np.any(high > low) else 0):
-        less = held - low_pass(held, record.cutoff, record.period)
-        before, held = held, np.where(record.turns, np.clip(less, asked - high, asked - low), held)
-        if np.array_equal(before, held):
+        held = np.where(record.turns, asked - taken, left)
+        before, taken = taken, np.clip(taken + low_pass(held, record.cutoff, record.period), low, high)
+        if np.array_equal(before[record.turns], taken[record.turns]):
             break
-    return np.asarray(held)
+    return np.asarray(taken)
+
+
+def subtract_friction(left: Floats, friction: RestingFriction, record: RecordedMotion, taken: Floats) -> Floats:
+    """Subtracts from residual torque (k, n) a friction (k, n) of joints at rest or at a reversal."""
+    if not record.turns.any():
+        return left
+    return np.where(record.turns, record.mean_in_turn(left + friction.sliding) - taken, left)
+
+
+def follow_limits(taken: Floats, before: RestingFriction, after: RestingFriction) -> Floats:
+    """Returns a friction at rest (k, n) that stays as it is between its limits, and moves with those that it is at."""
+    found = np.clip(taken, after.lowest, after.highest)
+    found = np.where(taken >= before.highest, after.highest, found)
+    return np.where(taken <= before.lowest, after.lowest, found)

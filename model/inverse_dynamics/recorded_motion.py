@@ -158,8 +158,13 @@ class RecordedMotion:
         if not late.any():
             return drive
         times = np.clip(self.time[:, None] - late, self.time[0], self.time[-1])
-        splines = [CubicSpline(self.time, column) for column in drive.T]
-        return np.stack([spline(times[:, j]) for j, spline in enumerate(splines)], axis=1)
+        splines = self._splines if drive is self.drive else [CubicSpline(self.time, column) for column in drive.T]
+        return np.stack([splines[j](times[:, j]) for j in range(len(late))], axis=1)
+
+    @cached_property
+    def _splines(self) -> list[CubicSpline]:
+        """By joint, the drive between the grid's times."""
+        return [CubicSpline(self.time, column) for column in self.drive.T]
 
     def _acting(self, samples: Floats) -> Floats:
         """Returns the samples (r, n) of a drive as they act, without the half period by which holding delays them."""

@@ -18,7 +18,13 @@ from model.drives.piecewise import EDGE
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics import supplied_torque as kernel
 from model.inverse_dynamics.drive_timing import samples_late
-from model.inverse_dynamics.friction_at_rest import RestingFriction, friction_at_rest, subtract_held
+from model.inverse_dynamics.friction_at_rest import (
+    RestingFriction,
+    follow_limits,
+    friction_at_rest,
+    held_friction,
+    subtract_friction,
+)
 from model.inverse_dynamics.link_motion import SENSOR_COLUMNS, LinkMotion, link_motion
 from model.inverse_dynamics.needed_torque import NeededTorque
 from model.inverse_dynamics.readings import derivative
@@ -51,6 +57,19 @@ BODY_COLUMNS = (*range(at.A, at.SHIFT + 1), at.ROTOR_INERTIA, at.GEAR, at.PRISMA
 FRICTION_COLUMNS = (at.COULOMB, at.COULOMB_ARM, at.GRAVITY_SHARE)
 
 
+@dataclass(frozen=True)
+class _Column:
+    """The residual of one joint along one record, with what it was computed from.
+
+    given: (5, k) torque, factor and friction at rest. left: (m, 1). taken: (k, 1) friction at rest.
+    """
+
+    given: Floats
+    left: Floats
+    taken: Floats
+    friction: RestingFriction
+
+
 @dataclass
 class TorqueBalance:
     """Residual torques of records for one structure of model, at compared samples: one array (m, n) per record.
@@ -62,11 +81,11 @@ class TorqueBalance:
     records: tuple[RecordedMotion, ...]
     _kept: dict[str, tuple[bytes, list[Any]]] = field(default_factory=dict, repr=False)
     _geometries: dict[int, dict[bytes, NeededTorque]] = field(default_factory=dict, repr=False)
-    _last: dict[tuple[int, int], list[tuple[Floats, Floats]]] = field(default_factory=dict, repr=False)
+    _last: dict[tuple[int, int], list[_Column]] = field(default_factory=dict, repr=False)
     difference: float = DIFFERENCE
     """Step of the finite differences, as a share of a parameter's natural size."""
 
-    def residual(self, values: Mapping[str, float]) -> list[Floats]:
+    def residual(self, values: Mapping[str, float], near: Sequence[Sequence[_Column]] | None = None) -> list[Floats]:
         """Returns the motors' torque that the motion needs − the torque applied, N·m (N), low-passed, at compared
         samples.
 
@@ -105,10 +124,18 @@ class TorqueBalance:
             )
             torque, rise = self._missing(driven, motion.acceleration, needed[i], joints)
             told = (1.0 + rise) * self._told_per_torque(joints)
-            result.append(self._compared(i, torque, told, friction_at_rest(levels[i], motion, joints)))
+            friction = friction_at_rest(levels[i], motion, joints)
+            result.append(self._compared(i, torque, told, friction, None if near is None else near[i]))
         return result
 
-    def _compared(self, index: int, torque: Floats, told: Floats, friction: RestingFriction) -> Floats:
+    def _compared(
+        self,
+        index: int,
+        torque: Floats,
+        told: Floats,
+        friction: RestingFriction,
+        near: Sequence[_Column] | None,
+    ) -> Floats:
         """Returns (m, n) from a torque (k, n): without friction at rest, and scaled by factors `told` (k, n).
 
         It computes only joints whose torque or friction differs from both of the last two distinct results: a
@@ -117,13 +144,28 @@ class TorqueBalance:
         columns = []
         for j, record in enumerate(self.records[index].by_joint):
             given = np.stack([torque[:, j], told[:, j], *(part[:, j] for part in friction)])
+            if near is not None:
+                base = near[j]
+                if np.array_equal(base.given, given):
+                    columns.append(base.left)
+                    continue
+                own = friction.of_joint(j)
+                taken = follow_limits(base.taken, base.friction, own)
+                held = subtract_friction(torque[:, j : j + 1], own, record, taken)
+                columns.append(record.subtract_unknown(record.compared(held * told[:, j : j + 1])))
+                continue
             last = self._last.setdefault((index, j), [])
-            found = next((done for key, done in last if np.array_equal(key, given)), None)
+            found = next((one for one in last if np.array_equal(one.given, given)), None)
             if found is None:
-                held = subtract_held(torque[:, j : j + 1], friction.of_joint(j), record)
-                found = record.subtract_unknown(record.compared(held * told[:, j : j + 1]))
-                last[:] = [(given, found), *last[:1]]
-            columns.append(found)
+                own = friction.of_joint(j)
+                taken = held_friction(torque[:, j : j + 1], own, record)
+                held = subtract_friction(torque[:, j : j + 1], own, record, taken)
+                left = record.subtract_unknown(record.compared(held * told[:, j : j + 1]))
+                found = _Column(given, left, taken, own)
+                last[:] = [found, *last[:1]]
+            elif found is not last[0]:
+                last[:] = [found, last[0]]
+            columns.append(found.left)
         return np.concatenate(columns, axis=1)
 
     def of_model(self, model: Model) -> TorqueBalance:
@@ -135,22 +177,31 @@ class TorqueBalance:
         file's."""
         return self._told_per_torque(_joints_of(self._vector(values), self.model))
 
-    def slope(self, values: Mapping[str, float], residual: Sequence[Floats], unknown: Unknown) -> list[Floats]:
-        """Returns the derivative (m, n) of every record's residual by one unknown: a difference towards the inside of
+    def slopes(self, values: Mapping[str, float], unknowns: Sequence[Unknown]) -> list[list[Floats]]:
+        """Returns the derivatives (m, n) of every record's residual by each unknown: differences towards the inside of
         its bounds.
 
         A threshold switches from sample to sample; its derivative is the difference over a smooth edge.
-
-        residual: result of `residual` for the same values.
         """
+        residual = self.residual(values)
+        near = [[self._last[i, j][0] for j in range(len(r.by_joint))] for i, r in enumerate(self.records)]
+        return [self._slope(values, residual, near, u) for u in unknowns]
+
+    def _slope(
+        self,
+        values: Mapping[str, float],
+        residual: Sequence[Floats],
+        near: Sequence[Sequence[_Column]],
+        unknown: Unknown,
+    ) -> list[Floats]:
         if unknown.parameter.effect == THRESHOLD and values[unknown.name] > 0:
             half = 0.5 * EDGE * values[unknown.name]
-            sides = (self.residual({**values, unknown.name: values[unknown.name] + s * half}) for s in (1, -1))
+            sides = (self.residual({**values, unknown.name: values[unknown.name] + s * half}, near) for s in (1, -1))
             return [(above - below) / (2 * half) for above, below in zip(*sides, strict=True)]
         step = self.difference * unknown.scale
         if values[unknown.name] + step > unknown.high:
             step = -step
-        moved = self.residual({**values, unknown.name: values[unknown.name] + step})
+        moved = self.residual({**values, unknown.name: values[unknown.name] + step}, near)
         return [(after - before) / step for after, before in zip(moved, residual, strict=True)]
 
     def supplied_by_drive(self) -> list[Floats]:
@@ -260,9 +311,9 @@ def _torque_per_volt(joints: Floats) -> Floats:
 
 
 def _levels(model: Model, chain: ChainArrays, position: Floats, joints: Floats) -> Floats:
-    out, settings = np.zeros_like(position), np.zeros(at.SETTINGS, dtype=np.int64)
+    out, settings = np.zeros_like(position) + joints[:, at.COULOMB], np.zeros(at.SETTINGS, dtype=np.int64)
     settings[at.PUBLISHED_LOADS] = int(is_rod_arm(model.machine))
-    if joints[:, list(FRICTION_COLUMNS)].any():
+    if joints[:, [at.COULOMB_ARM, at.GRAVITY_SHARE]].any():
         kernel.friction_levels(chain, position, joints, settings, out)
     return out
 

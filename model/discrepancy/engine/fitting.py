@@ -16,6 +16,7 @@ import numpy as np
 
 from model.arrays import Floats
 from model.discrepancy.diagnosis import FoundValue
+from model.discrepancy.engine.bodies import unknown_bodies
 from model.discrepancy.engine.priors import prior_cost, prior_rows
 from model.discrepancy.engine.residual import Residual, Signals, Values
 from model.fitting.covariance import sandwich
@@ -50,6 +51,10 @@ SETTLED = 0.3
 BENT = (0.4, 0.12)
 """Shares of a step that leads uphill at which a curved path is tried: along a valley of two numbers whose product
 counts, what a step misses tells how the valley bends."""
+INNER = 12
+"""Most rounds in which a step of bodies is found with the priors where it leads."""
+HALVED = (1.0, 0.5, 0.25, 0.125)
+"""Shares of such a round's step that are tried."""
 FORETOLD = 0.1
 """Share of the residual's change that derivatives may have missed and still hold."""
 FOLDS = 4
@@ -210,7 +215,7 @@ def descend(best: Fit, slopes: Slopes, rounds: int = ROUNDS, goal: float = math.
     for k, name in enumerate(names):
         if name in slopes:
             J[k] = slopes[name]
-    due, since, begun = bool(own), 0, best.cost
+    due, since, begun, bodies = bool(own), 0, best.cost, unknown_bodies(best.model, best.unknowns)
     for number in range(rounds):
         if due:
             which = own if partly else list(range(len(names)))
@@ -218,6 +223,10 @@ def descend(best: Fit, slopes: Slopes, rounds: int = ROUNDS, goal: float = math.
             J[which] = np.where(np.isfinite(rows).all(axis=1, keepdims=True), rows, 0.0)  # none where it runs away
             since, begun = 0, best.cost
         following, J, foretold = _step(best, J)
+        if following is not best:
+            before, after = (np.array([one.values[name] for name in names]) for one in (best, following))
+            for body in bodies:
+                body.transport(J, before, after)
         fell = 0.0 if following is best else best.cost - following.cost
         best = following
         since, ends = since + 1, fell < SETTLED
@@ -249,28 +258,67 @@ class _Linearised:
         self.A = now.weighted(self.J) * scale[:, None]
         self.seen = self.A @ self.A.T
         self.low, self.high = (low - self.at) / scale, (high - self.at) / scale
+        self.bodies = unknown_bodies(now.model, now.unknowns)
 
     @property
     def information(self) -> Floats:
         """(p, p) of records and priors."""
         return np.asarray(self.seen + self.rows.T @ self.rows)
 
-    @property
-    def descent(self) -> Floats:
-        """(p,) minus half the gradient of the cost."""
-        return np.asarray(self.rows.T @ self.aims - self.A @ self.left)
+    def damping(self, share: float) -> Floats:
+        """(p,) what is added to the diagonal of the information, a share of it."""
+        return np.asarray(DAMPING**2 + (LEAST_DAMPING + share) * np.diag(self.information))
 
-    def damped(self, damping: float) -> Floats:
-        """The information with a share of its diagonal added."""
-        found = self.information
-        return np.asarray(found + np.diag(DAMPING**2 + (LEAST_DAMPING + damping) * np.diag(found)))
+    def best_step(self, share: float) -> tuple[Floats, float]:
+        """The step (p,) of the lowest cost as far as derivatives tell, damped by a share of the information, and how
+        far the cost falls. Torques are linear in other numbers of bodies than priors, and neither costs a simulation:
+        the step is found by both as they are."""
+        damping, given = self.damping(share), self.A @ self.left
+
+        def cost(step: Floats) -> float:
+            _, aims = prior_rows(self.now.unknowns, self.at + step * self.scale)
+            y = self.told(step)
+            return float(y @ (self.seen @ y + 2.0 * given) + step @ (damping * step) + aims @ aims)
+
+        step = np.zeros_like(self.at)
+        first = least = cost(step)
+        for _ in range(INNER if self.bodies else 1):
+            rows, aims = prior_rows(self.now.unknowns, self.at + step * self.scale)
+            rows, chain = rows * self.scale, self.told_by(step)
+            curvature = chain.T @ self.seen @ chain + rows.T @ rows + np.diag(damping)
+            pull = rows.T @ aims - chain.T @ (given + self.seen @ self.told(step)) - damping * step
+            whole = bounded_step(curvature, pull, self.low - step, self.high - step)
+            tried = ((found, cost(found)) for found in (step + s * whole for s in HALVED))
+            found = next((one for one in tried if one[1] < least), None)
+            if found is None:
+                break
+            settled = least - found[1] < 0.1 * SETTLED
+            step, least = found
+            if settled:
+                break
+        return step, first - least + float(step @ (damping * step))
+
+    def told(self, step: Floats) -> Floats:
+        """(p,) the step with which torques change in proportion."""
+        change = step * self.scale
+        for body in self.bodies:
+            body.linearise(change, self.at, self.at + step * self.scale)
+        return change / self.scale
+
+    def told_by(self, step: Floats) -> Floats:
+        """(p, p) its derivatives by the step."""
+        found = np.diag(self.scale)
+        for body in self.bodies:
+            body.chain(found, self.at, self.at + step * self.scale)
+        return found / self.scale[:, None]
 
     def moved_by(self, step: Floats) -> tuple[Fit, Floats, Floats]:
-        """The fit a step away, the step within the bounds, and (N,) the change that derivatives had not foretold."""
+        """The fit a step away, the step as torques tell it, and (N,) the change that derivatives had not foretold."""
+        step = np.clip(step, self.low, self.high)
         values = np.clip(self.at + step * self.scale, self.at + self.low * self.scale, self.at + self.high * self.scale)
+        moved = self.told(step)
         named = {u.name: float(v) for u, v in zip(self.now.unknowns, values, strict=True)}
         tried = evaluate(self.now.compared, self.now.unknowns, named, self.now.memory)
-        moved = (values - self.at) / self.scale
         return tried, moved, tried.row - self.now.row - (moved * self.scale) @ self.J
 
     def along_valley(self, whole: Floats) -> Fit | None:
@@ -279,7 +327,7 @@ class _Linearised:
         x(t) = t v + (t/h)² b: the change that a short step h v had not foretold grows with t², and b is the step that
         takes it back (Transtrum and Sethna 2012).
         """
-        short, curvature = BENT[-1], self.damped(0.0)
+        short, curvature = BENT[-1], self.information + np.diag(self.damping(0.0))
         tried, moved, missed = self.moved_by(short * whole)
         if not math.isfinite(tried.cost):
             return None
@@ -307,10 +355,10 @@ def _step(now: Fit, J: Floats) -> tuple[Fit, Floats, bool]:
     where it leads."""
     here = _Linearised(now, J)
     for number, (share, damping) in enumerate(ATTEMPTS):
-        descent = here.descent
-        step = share * bounded_step(here.damped(damping), descent, here.low, here.high)
-        if float(descent @ step) < 0.5 * SETTLED:
+        step, fall = here.best_step(damping)
+        if share * fall < 0.5 * SETTLED:
             break
+        step = share * step
         tried, moved, missed = here.moved_by(step)
         if not math.isfinite(tried.cost):
             continue
@@ -318,7 +366,7 @@ def _step(now: Fit, J: Floats) -> tuple[Fit, Floats, bool]:
         foretold = float(wrong @ wrong) <= FORETOLD**2 * float(whole @ whole)
         if tried.cost < now.cost and foretold:
             return tried, here.J, True
-        if number == 0 and tried.cost >= now.cost and (better := here.along_valley(moved)) is not None:
+        if number == 0 and tried.cost >= now.cost and (better := here.along_valley(step)) is not None:
             return better, here.J, False
         here.correct(moved, missed)
         if tried.cost < now.cost:

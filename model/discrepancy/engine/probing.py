@@ -7,7 +7,7 @@ at the cost of their priors has been projected out of both.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -189,6 +189,18 @@ def _is_outside(trial: Trial, name: str, share: float, start: Start) -> bool:
     value = null[name] + share * (start[name] - null[name])
     room = 1e-9 * max(1.0, abs(value))
     return not p.low - room <= value <= p.high + room
+
+
+def rise_without(now: Fit, names: Collection[str]) -> float:
+    """By how much the cost rises where parameters go to their null values and all other unknowns follow, as far as
+    derivatives tell. `now` has derivatives."""
+    own = [k for k, u in enumerate(now.unknowns) if u.name in names and u.parameter.null is not None]
+    back = np.array(
+        [(now.unknowns[k].parameter.null - now.values[now.unknowns[k].name]) / now.unknowns[k].scale for k in own]
+    )
+    if not own:
+        return 0.0
+    return float(back @ np.linalg.solve(projection(now).inverse[np.ix_(own, own)], back))
 
 
 def projection(now: Fit) -> Projection:

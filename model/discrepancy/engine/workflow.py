@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -13,6 +14,7 @@ from model.discrepancy.engine.candidate import Fitted
 from model.discrepancy.engine.case import Case
 from model.discrepancy.engine.fitting import Fit
 from model.discrepancy.engine.judging import judge, needed_evidence, share_of_rest, suspect
+from model.discrepancy.engine.probing import rise_without
 from model.discrepancy.engine.search import (
     Findings,
     best_of_each,
@@ -166,7 +168,12 @@ class Workflow:
 
     def _if_superfluous(self, part: Step, needed: float) -> Standing | None:
         """The standing without an effect, if all the others explain as much but for evidence that is less than
-        `needed`; else None."""
+        `needed`; else None. It is only fitted where derivatives leave that open."""
+        now = self.found.now
+        independent = float((now.compared.samples.told / now.memory).min())
+        rise = independent * math.log1p(rise_without(now, part.parameters) / independent)
+        if LARGER_PART * rise > needed + len(part.parameters) * math.log(now.compared.samples.told.sum()):
+            return None
         without = self.found.remove(part)
         return without if evidence(without.now, self.found.now, len(part.parameters), 1) < needed else None
 

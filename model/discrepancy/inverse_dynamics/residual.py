@@ -92,8 +92,7 @@ class TorqueResidual:
 
     def slopes(self, values: Values, unknowns: Sequence[Unknown]) -> Floats:
         """(k, N) derivatives of the residual."""
-        left = self.balance.residual(values)
-        return np.array([self.samples.flat(self.balance.slope(values, left, u)) for u in unknowns])
+        return np.array([self.samples.flat(one) for one in self.balance.slopes(values, unknowns)])
 
     def deviations(self, row: Floats) -> Floats:
         """(n,) of the residual itself, `floor` at least."""
