@@ -65,12 +65,12 @@ class UnknownBody:
 def unknown_bodies(model: Model, unknowns: Sequence[Unknown]) -> list[UnknownBody]:
     """Returns the links whose centres are unknown, but for those that have another mass by an effect."""
     number = {slot: k for k, u in enumerate(unknowns) for slot in u.parameter.slots if slot >= at.SHARED}
+    centres = range(at.CENTRE_X, at.CENTRE_Z + 1)
     found = []
-    for joint in model.machine.modelled_joints:
-        slots = [at.slot(joint, column) for column in COLUMNS]
-        added = at.slot(joint, at.MASS_ADDED)
+    for first in sorted({slot - at.column(slot) for slot in number if at.column(slot) in centres}):
+        slots, added = [first + column for column in COLUMNS], first + at.MASS_ADDED
         places = tuple(k for k, slot in enumerate(slots) if slot in number)
-        if any(1 <= k <= 3 for k in places) and added not in number and model.vector[added] == 0.0:
+        if added not in number and model.vector[added] == 0.0:
             found.append(UnknownBody(model.vector[slots], places, tuple(number[slots[k]] for k in places)))
     return found
 

@@ -14,7 +14,13 @@ from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.options import TorqueOptions
 from model.inverse_dynamics import friction_at_rest
 from model.inverse_dynamics import supplied_torque as kernel
-from model.inverse_dynamics.friction_at_rest import RestingFriction, subtract_held
+from model.inverse_dynamics.friction_at_rest import (
+    RestingFriction,
+    follow_limits,
+    held_friction,
+    subtract_friction,
+    subtract_held,
+)
 from model.inverse_dynamics.link_motion import LinkMotion
 from model.inverse_dynamics.readings import choose_cutoff
 from model.inverse_dynamics.recorded_motion import RecordedMotion, low_pass
@@ -188,3 +194,18 @@ def test_a_record_without_frequencies_above_the_cutoff_says_nothing(rate: float)
     assert sound.drive is not None
     position, drive = (np.interp(time, sound.time, s[:, 0])[:, None] for s in (sound.position, sound.drive))
     assert find_shaking([replace(sound, time=time, position=position, drive=drive)], slide_machine(), 12.0) == ()
+
+
+@given(seed=st.integers(0, 10_000), size=st.floats(0.01, 3.0))
+def test_derivatives_with_friction_as_it_is_foretell_no_fall_that_friction_would_undo(seed: int, size: float) -> None:
+    """Friction may follow a torque within its limits, and leaves no more than if it stayed as it was."""
+    left, change = noise(seed) + np.sin(2.0 * RECORD.time)[:, None], size * np.sin(5.0 * RECORD.time)[:, None]
+    friction = coulomb(1.0)
+    taken = held_friction(left, friction, RECORD)
+    stays = subtract_friction(left + change, friction, RECORD, follow_limits(taken, friction, friction))
+    follows = subtract_held(left + change, friction, RECORD)
+    assert below_cutoff(follows) <= 1.05 * below_cutoff(stays) + 1e-9
+    more = follow_limits(taken, friction, coulomb(1.5))
+    at_limit = np.abs(taken) >= 1.0
+    np.testing.assert_allclose(np.abs(more[at_limit]), 1.5)
+    np.testing.assert_array_equal(more[~at_limit], taken[~at_limit])
