@@ -85,7 +85,7 @@ class TorqueBalance:
     difference: float = DIFFERENCE
     """Step of the finite differences, as a share of a parameter's natural size."""
 
-    def residual(self, values: Mapping[str, float], near: Sequence[Sequence[_Column]] | None = None) -> list[Floats]:
+    def residual(self, values: Mapping[str, float]) -> list[Floats]:
         """Returns the motors' torque that the motion needs − the torque applied, N·m (N), low-passed, at compared
         samples.
 
@@ -95,16 +95,20 @@ class TorqueBalance:
 
         values: of the model's parameters, and of `drive_timing.timing_unknowns`, by name.
         """
+        return self._residual(values, None)
+
+    def _residual(self, values: Mapping[str, float], near: Sequence[Sequence[_Column]] | None) -> list[Floats]:
+        """Returns the residual. near: columns by record and joint, whose friction at rest is kept; None to find it."""
         vector, late = self._vector(values), samples_late(self.model, values)
         joints = _joints_of(vector, self.model)
         chain = chain_body(np.ascontiguousarray(vector[: at.SHARED]), joints, self.model.flags)
         bodies = self.model.flags.tobytes() + vector[: at.SHARED].tobytes() + joints[:, list(BODY_COLUMNS)].tobytes()
         sensors = joints[:, list(SENSOR_COLUMNS)].tobytes()
-        friction = joints[:, list(FRICTION_COLUMNS)].tobytes()
+        rubbing = joints[:, list(FRICTION_COLUMNS)].tobytes()
         motions = self._cached("motion", sensors, lambda i: link_motion(self.records[i], joints))
         needed = self._cached("needed", sensors + bodies, lambda i: self._needed(sensors, chain, motions, i))
         levels = self._cached(
-            "levels", sensors + bodies + friction, lambda i: _levels(self.model, chain, motions[i].position, joints)
+            "levels", sensors + bodies + rubbing, lambda i: _levels(self.model, chain, motions[i].position, joints)
         )
         gravity = levels
         if self._own.shape[1] > 0:
@@ -143,28 +147,19 @@ class TorqueBalance:
         """
         columns = []
         for j, record in enumerate(self.records[index].by_joint):
-            given = np.stack([torque[:, j], told[:, j], *(part[:, j] for part in friction)])
-            if near is not None:
-                base = near[j]
-                if np.array_equal(base.given, given):
-                    columns.append(base.left)
-                    continue
-                own = friction.of_joint(j)
-                taken = follow_limits(base.taken, base.friction, own)
-                held = subtract_friction(torque[:, j : j + 1], own, record, taken)
-                columns.append(record.subtract_unknown(record.compared(held * told[:, j : j + 1])))
-                continue
-            last = self._last.setdefault((index, j), [])
-            found = next((one for one in last if np.array_equal(one.given, given)), None)
+            given, own = np.stack([torque[:, j], told[:, j], *(part[:, j] for part in friction)]), friction.of_joint(j)
+            known = self._last.setdefault((index, j), []) if near is None else [near[j]]
+            found = next((one for one in known if np.array_equal(one.given, given)), None)
             if found is None:
-                own = friction.of_joint(j)
-                taken = held_friction(torque[:, j : j + 1], own, record)
-                held = subtract_friction(torque[:, j : j + 1], own, record, taken)
-                left = record.subtract_unknown(record.compared(held * told[:, j : j + 1]))
-                found = _Column(given, left, taken, own)
-                last[:] = [found, *last[:1]]
-            elif found is not last[0]:
-                last[:] = [found, last[0]]
+                whole = torque[:, j : j + 1]
+                if near is None:
+                    taken = held_friction(whole, own, record)
+                else:
+                    taken = follow_limits(near[j].taken, near[j].friction, own)
+                moving = subtract_friction(whole, own, record, taken) * told[:, j : j + 1]
+                found = _Column(given, record.subtract_unknown(record.compared(moving)), taken, own)
+            if near is None:
+                known[:] = [found, *(one for one in known if one is not found)][:2]
             columns.append(found.left)
         return np.concatenate(columns, axis=1)
 
@@ -177,31 +172,41 @@ class TorqueBalance:
         file's."""
         return self._told_per_torque(_joints_of(self._vector(values), self.model))
 
-    def slopes(self, values: Mapping[str, float], unknowns: Sequence[Unknown]) -> list[list[Floats]]:
+    def slopes(
+        self, values: Mapping[str, float], unknowns: Sequence[Unknown], keep_friction: bool = True
+    ) -> list[list[Floats]]:
         """Returns the derivatives (m, n) of every record's residual by each unknown: differences towards the inside of
         its bounds.
 
         A threshold switches from sample to sample; its derivative is the difference over a smooth edge.
+
+        keep_friction: whether friction at rest stays as it is, within its limits. It leaves no less then than if it
+        followed, so that a step of a fit leads no farther than friction can follow. Otherwise it takes all of a change
+        that it can, which is what the records tell.
         """
         residual = self.residual(values)
-        near = [[self._last[i, j][0] for j in range(len(r.by_joint))] for i, r in enumerate(self.records)]
+        near = (
+            None
+            if not keep_friction
+            else [[self._last[i, j][0] for j in range(len(r.by_joint))] for i, r in enumerate(self.records)]
+        )
         return [self._slope(values, residual, near, u) for u in unknowns]
 
     def _slope(
         self,
         values: Mapping[str, float],
         residual: Sequence[Floats],
-        near: Sequence[Sequence[_Column]],
+        near: Sequence[Sequence[_Column]] | None,
         unknown: Unknown,
     ) -> list[Floats]:
         if unknown.parameter.effect == THRESHOLD and values[unknown.name] > 0:
             half = 0.5 * EDGE * values[unknown.name]
-            sides = (self.residual({**values, unknown.name: values[unknown.name] + s * half}, near) for s in (1, -1))
+            sides = (self._residual({**values, unknown.name: values[unknown.name] + s * half}, near) for s in (1, -1))
             return [(above - below) / (2 * half) for above, below in zip(*sides, strict=True)]
         step = self.difference * unknown.scale
         if values[unknown.name] + step > unknown.high:
             step = -step
-        moved = self.residual({**values, unknown.name: values[unknown.name] + step}, near)
+        moved = self._residual({**values, unknown.name: values[unknown.name] + step}, near)
         return [(after - before) / step for after, before in zip(moved, residual, strict=True)]
 
     def supplied_by_drive(self) -> list[Floats]:

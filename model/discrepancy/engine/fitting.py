@@ -377,7 +377,8 @@ def _step(now: Fit, J: Floats) -> tuple[Fit, Floats, bool]:
 def standard_deviations(now: Fit) -> dict[str, float]:
     """Standard deviations, by name, of the unknowns that change the residual at all, for correlated residuals (White
     1980): none where no joint moves."""
-    slopes, samples = now.slopes(), now.compared.samples
+    rows, samples = now.compared.told_slopes(now.values, now.unknowns), now.compared.samples
+    slopes = {u.name: np.where(np.isfinite(row).all(), row, 0.0) for u, row in zip(now.unknowns, rows, strict=True)}
     used = [u for u in now.unknowns if np.abs(slopes[u.name]).max(initial=0.0) > 0]
     if not used:
         return {}

@@ -194,13 +194,16 @@ def _is_outside(trial: Trial, name: str, share: float, start: Start) -> bool:
 def rise_without(now: Fit, names: Collection[str]) -> float:
     """By how much the cost rises where parameters go to their null values and all other unknowns follow, as far as
     derivatives tell. `now` has derivatives."""
-    own = [k for k, u in enumerate(now.unknowns) if u.name in names and u.parameter.null is not None]
-    back = np.array(
-        [(now.unknowns[k].parameter.null - now.values[now.unknowns[k].name]) / now.unknowns[k].scale for k in own]
-    )
+    nulls = {k: u.parameter.null for k, u in enumerate(now.unknowns) if u.name in names}
+    own = {
+        k: (null - now.values[now.unknowns[k].name]) / now.unknowns[k].scale
+        for k, null in nulls.items()
+        if null is not None
+    }
     if not own:
         return 0.0
-    return float(back @ np.linalg.solve(projection(now).inverse[np.ix_(own, own)], back))
+    numbers, back = list(own), np.array(list(own.values()))
+    return float(back @ np.linalg.solve(projection(now).inverse[np.ix_(numbers, numbers)], back))
 
 
 def projection(now: Fit) -> Projection:

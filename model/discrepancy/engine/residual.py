@@ -107,7 +107,11 @@ class Residual(Protocol):
         ...
 
     def slopes(self, values: Values, unknowns: Sequence[Unknown]) -> Floats:
-        """(k, N) derivatives of the residual."""
+        """(k, N) derivatives of the residual, for steps of a fit."""
+        ...
+
+    def told_slopes(self, values: Values, unknowns: Sequence[Unknown]) -> Floats:
+        """(k, N) those of what records tell: without what friction at rest takes up."""
         ...
 
     def deviations(self, row: Floats) -> Floats:

@@ -91,8 +91,13 @@ class TorqueResidual:
         return np.array([self.samples.flat(self.balance.residual(v)) - first for v in moved]).reshape(-1, len(first))
 
     def slopes(self, values: Values, unknowns: Sequence[Unknown]) -> Floats:
-        """(k, N) derivatives of the residual."""
+        """(k, N) derivatives of the residual, with friction at rest as it is."""
         return np.array([self.samples.flat(one) for one in self.balance.slopes(values, unknowns)])
+
+    def told_slopes(self, values: Values, unknowns: Sequence[Unknown]) -> Floats:
+        """(k, N) those without what friction at rest takes up."""
+        found = self.balance.slopes(values, unknowns, keep_friction=False)
+        return np.array([self.samples.flat(one) for one in found])
 
     def deviations(self, row: Floats) -> Floats:
         """(n,) of the residual itself, `floor` at least."""

@@ -177,6 +177,10 @@ class ReadingResidual:
             rows[wild] = self.changes(values, moved) / moves[wild, None]
         return rows
 
+    def told_slopes(self, values: Values, unknowns: Sequence[Unknown]) -> Floats:
+        """(k, N) the same: friction at rest is part of the simulation."""
+        return self.slopes(values, unknowns)
+
     def deviations(self, row: Floats) -> Floats:  # noqa: ARG002 (those of readings are known)
         """(n,) of the noise of a reading."""
         return self.floor

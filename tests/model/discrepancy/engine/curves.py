@@ -55,6 +55,9 @@ class Curve:
     def at(self, values: Mapping[str, float]) -> tuple[Floats]:
         return ((self.measured - self.formula(self.time, values))[:, None],)
 
+    def told_slopes(self, values: Mapping[str, float], unknowns: Sequence[Unknown]) -> Floats:
+        return self.slopes(values, unknowns)
+
     def slopes(self, values: Mapping[str, float], unknowns: Sequence[Unknown]) -> Floats:
         self.asked.append([u.name for u in unknowns])
         return np.stack([self.samples.flat((-self.slope[u.name](self.time, values)[:, None],)) for u in unknowns])
