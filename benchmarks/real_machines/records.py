@@ -64,7 +64,8 @@ def read_columns(rig: Rig, record: Record, folder: Path) -> Columns:
         trace = read_trace(files[0], map=mapping, where=None if where == ".." else f"time={where}", drive_unit=unit)
     columns = {"time": trace.time}
     for signal in ("set_point", "position", "drive", "velocity"):
-        if any(key.rstrip("_0123456789") == signal for key in mapping):  # not an integrated position
+        given = [key for key, text in mapping.items() if text != "none"]
+        if any(key.rstrip("_0123456789") == signal for key in given):  # not an integrated position
             values = getattr(trace, signal)
             columns |= {f"{signal}_{joint}": values[:, trace.column(joint)] for joint in trace.joints}
     return columns
