@@ -66,16 +66,12 @@ def test_a_unit_may_do_little_by_systemds_own_rating(name: str) -> None:
     assert float(rating) <= MOST_EXPOSURE
 
 
-def test_the_ports_of_arms_stay_open_to_the_service() -> None:
+def test_the_ports_of_arms_stay_open_to_the_service_and_instances_share_no_folder() -> None:
     unit = settings("ma2000-daq@.service")
     assert unit["DeviceAllow"] == ["char-ttyUSB rw", "char-ttyACM rw", "char-ttyS rw"]
     assert unit["SupplementaryGroups"] == ["dialout"]
     # Either would hide the devices, whatever DeviceAllow says.
     assert not {"PrivateDevices", "PrivateUsers"} & unit.keys()
-
-
-def test_instances_share_no_folder() -> None:
-    unit = settings("ma2000-daq@.service")
     for key in ("RuntimeDirectory", "StateDirectory", "CacheDirectory"):
         assert unit[key] == ["ma2000-daq/%i"]
     assert "%i" in unit["ExecStart"][0]

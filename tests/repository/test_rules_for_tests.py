@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.mutants import Mutant, mutants_of
-from benchmarks.mutation import equivalents, files_of_tests, mirrored_folder
+from benchmarks.mutation import equivalents
 from tests.conftest import DETERMINISTIC
 from tests.order import AGAINST_THE_CLOCK
 from tests.repository.inner_run import ROOT, run_folder
@@ -161,15 +161,6 @@ def test_a_mutant_differs_in_one_place_and_every_equivalent_one_exists() -> None
     listed = set(equivalents())
     made = {mutant.identity for file in {file for file, *_ in listed} for mutant in _mutants_of_file(file)}
     assert listed - made == set()
-
-
-def test_a_module_is_tried_by_the_tests_of_its_folder() -> None:
-    assert mirrored_folder("daq/link/pending.py") == ROOT / "tests" / "daq" / "link"
-    assert mirrored_folder("firmware_protocol/units.py") == ROOT / "tests" / "protocol"
-    assert mirrored_folder("server/queue/order.py").is_relative_to(ROOT / "tests" / "server")
-    assert mirrored_folder("firmware_protocol/bridge/stack.py") == ROOT / "tests" / "firmware"
-    assert "tests/daq/link/test_transactions.py" in files_of_tests("daq/link/pending.py")
-    assert mirrored_folder("mock_controller/board/board.py").is_relative_to(ROOT / "tests" / "mock")
 
 
 def _mutants_of_file(file: str) -> list[Mutant]:

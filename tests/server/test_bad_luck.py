@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from benchmarks.service_process import children
 from daq.link import Link
 from daq.traces.reader import read_trace
 from daq.transport import MockPort, parse_port_url
@@ -50,7 +51,7 @@ def _partial_trace(service: Service, experiment: dict[str, Any], outcome: str) -
 def test_whatever_process_is_killed_its_work_is_interrupted_and_what_waits_waits_for_a_person(tmp_path: Path) -> None:
     with running_service(tmp_path) as service:
         running, waiting = _left_behind(service)
-        owner = _owner_of(service.process.pid)
+        (owner,) = children(service.process.pid, b"server.owner")
         assert service.end(signal.SIGKILL) == -signal.SIGKILL
         wait_for_end(owner, 60)  # it freezes the arm, records a second more and closes the trace by itself
     log = tmp_path / "log"
@@ -83,7 +84,8 @@ def _after_the_server(service: Service, running: str, waiting: str) -> str:
 
 def _without_the_acquisition_process(service: Service) -> str:
     running, waiting = _left_behind(service)
-    os.kill(_owner_of(service.process.pid), signal.SIGKILL)
+    (owner,) = children(service.process.pid, b"server.owner")
+    os.kill(owner, signal.SIGKILL)
     ended = service.end_of(running)
     assert ended["state"] == "interrupted", ended
     queue = service.robot.get("/queue").json()
@@ -107,7 +109,7 @@ def _without_the_worker(service: Service, trace: str) -> None:
     progress = service.folder / "service" / "jobs" / fit["id"] / PROGRESS
     while not progress.exists():
         assert service.robot.get(f"/jobs/{fit['id']}", params={"wait": 0.1}).json()["state"] in ("queued", "running")
-    workers = _children(service.process.pid, b"spawn_main")
+    workers = list(children(service.process.pid, b"spawn_main"))
     compare = {"kind": "compare", "traces": [trace], "models": ["machine"]}
     following = service.robot.post("/jobs", json=compare).json()
     assert workers
@@ -215,26 +217,11 @@ def test_a_disk_that_fills_up_ends_the_run_and_keeps_what_was_written(service: S
     begun = part.stat().st_size
     while part.stat().st_size == begun:  # nothing of it has been synced yet
         assert service.process.poll() is None
-    with _no_file_grows(_owner_of(service.process.pid), part.stat().st_size):
+    (owner,) = children(service.process.pid, b"server.owner")
+    with _no_file_grows(owner, part.stat().st_size):
         ended = service.end_of(running)
     assert ended["state"] == "failed", ended
     assert "the run was ended and the arm frozen" in ended["reason"]
     assert service.status()["arm"] in ("stopped", "fault")
     assert service.robot.get("/queue").json()["paused"]
     _partial_trace(service, ended, "interrupted")
-
-
-# ---- helpers
-
-
-def _owner_of(service: int) -> int:
-    """The process that owns the port."""
-    (owner,) = _children(service, b"server.owner")
-    return owner
-
-
-def _children(service: int, word: bytes) -> list[int]:
-    """The processes of a service whose command has this word."""
-    threads = Path(f"/proc/{service}/task").iterdir()
-    children = [int(child) for thread in threads for child in (thread / "children").read_text().split()]
-    return [child for child in children if word in Path(f"/proc/{child}/cmdline").read_bytes()]

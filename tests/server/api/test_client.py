@@ -42,13 +42,17 @@ def test_an_experiment_from_its_submission_to_its_trace(robot: Robot, tmp_path: 
     trace = read_trace(path)
     details = robot.traces.get(ended.trace)
     assert (details.entry.samples, details.record.trace_id) == (len(trace), ended.trace)
+    assert details.entry.experiment == made.id
     assert robot.traces.find("last").id == robot.traces.find(ended.trace[:8]).id == ended.trace
     assert robot.traces.change(ended.trace, tags=["client"]).tags == ("client",)
     assert [entry.id for entry in robot.traces.list(tag="client")] == [ended.trace]
-    assert len(robot.traces.signals(ended.trace, points=20).time) <= 20
+    signals = robot.traces.signals(ended.trace, points=20)
+    assert (signals.samples, len(signals.time)) == (len(trace), 20)
+    assert max(signals.position[0]) == trace.position[:, 0].max()
     assert next(iter(robot.experiments.list("done"))).id == made.id
     table = robot.traces.download_csv(ended.trace, tmp_path / "table.csv").read_text()
     assert table.startswith("time [s],")
+    assert len(table.splitlines()) == len(trace) + 1
     with pytest.raises(ServiceError) as there_already:
         robot.traces.upload(path)
     assert there_already.value.kind == "trace-exists"

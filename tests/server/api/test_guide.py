@@ -18,6 +18,8 @@ GUIDE = ROOT.joinpath("docs", "service.md").read_text("utf-8")
 URL, STOP_URL = "http://127.0.0.1:8300", "http://127.0.0.1:8301"
 BLOCKS = re.findall(r"^```console\n(.*?)^```", GUIDE, re.MULTILINE | re.DOTALL)
 PROGRAMS = re.findall(r"^```python\n(.*?)^```", GUIDE, re.MULTILINE | re.DOTALL)
+assert len(BLOCKS) > 8
+assert PROGRAMS
 
 
 @pytest.fixture
@@ -58,18 +60,17 @@ def test_what_the_guide_says_to_type_works(block: str, service: Service, daq: Co
         service.end_of(running)
 
 
+def _printed_by(folder: Path, *words: str) -> list[str]:
+    """The lines of a Python that ends well."""
+    command = [sys.executable, *words]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=100, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()
+
+
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_the_programs_of_the_guide_run(program: str, service: Service, tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", _here(program, service)],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=100,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    lines = done.stdout.splitlines()
+    lines = _printed_by(tmp_path, "-c", _here(program, service))
     assert lines[0].split() == ["done"]
     assert (tmp_path / lines[1]).is_file()
     assert len(lines) == 7
@@ -77,20 +78,7 @@ def test_the_programs_of_the_guide_run(program: str, service: Service, tmp_path:
 
 def test_the_study_runs(service: Service, tmp_path: Path) -> None:
     script = ROOT / "examples" / "repeatability.py"
-    done = subprocess.run(
-        [sys.executable, str(script), service.url, "--runs", "2", "--folder", "kept"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=100,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
+    lines = _printed_by(tmp_path, str(script), service.url, "--runs", "2", "--folder", "kept")
     assert len(list((tmp_path / "kept").glob("*.mcap"))) == 2
-    assert [line.split(":")[0] for line in done.stdout.splitlines()[2:]] == ["joint 1", "joint 2", "joint 3"]
+    assert [line.split(":")[0] for line in lines[2:]] == ["joint 1", "joint 2", "joint 3"]
     assert len(service.robot.get("/traces", params={"tag": "repeatability"}).json()["items"]) == 2
-
-
-def test_there_is_something_to_type() -> None:
-    assert len(BLOCKS) > 8
-    assert PROGRAMS

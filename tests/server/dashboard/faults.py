@@ -1,8 +1,8 @@
 """What axe finds fault with on a page as it is now."""
 
-from typing import Any
+from typing import Any, Literal
 
-from playwright.sync_api import Page
+from playwright.sync_api import Page, expect
 
 from tests.repository.tracked import ROOT
 
@@ -29,6 +29,20 @@ def faults_of(page: Page, rules: dict[str, Any] = RULES) -> list[str]:
     found: dict[str, Any] = page.evaluate("rules => axe.run(document, rules)", rules)
     page.set_viewport_size(size)
     return [_told(one) for one in found["violations"]]
+
+
+SCHEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
+
+
+def faults_in_both_schemes(page: Page) -> list[str]:
+    """The same light and dark, of which the second differs in its colours alone."""
+    page.emulate_media(reduced_motion="reduce")  # no colour is judged on its way to another
+    found = []
+    for scheme, rules in zip(SCHEMES, (RULES, COLOURS), strict=True):
+        page.emulate_media(color_scheme=scheme)
+        expect(page.locator("html")).to_have_attribute("data-theme", scheme)
+        found += [f"{scheme}: {fault}" for fault in faults_of(page, rules)]
+    return found
 
 
 def _told(violation: dict[str, Any]) -> str:

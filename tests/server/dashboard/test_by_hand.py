@@ -55,7 +55,9 @@ def test_a_program_is_there_after_another_page_and_another_control(dashboard: Da
     assert robot.get("/programs").json() == []
 
 
-def test_gains_are_changed_and_read_back(dashboard: Dashboard, controlled: Page) -> None:
+def test_gains_are_changed_and_read_back_and_jogging_is_beside_the_arm(dashboard: Dashboard, controlled: Page) -> None:
+    panel = controlled.locator("section").filter(has=controlled.get_by_text("This browser shows no 3-D"))
+    expect(panel.get_by_role("group", name="Jog:")).to_be_visible()
     robot = dashboard.service.robot
     before = robot.get("/gains").json()["gains"]["2"]
     field = controlled.get_by_label("P of joint 2", exact=True)
@@ -73,8 +75,3 @@ def test_gains_are_changed_and_read_back(dashboard: Dashboard, controlled: Page)
     write.click()
     expect(write).to_be_disabled()
     assert robot.get("/gains").json()["gains"]["2"] == before
-
-
-def test_jogging_is_beside_the_arm(controlled: Page) -> None:
-    panel = controlled.locator("section").filter(has=controlled.get_by_text("This browser shows no 3-D"))
-    expect(panel.get_by_role("group", name="Jog:")).to_be_visible()

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.server.dashboard.browser import TABLET, Dashboard, row_of
-from tests.server.dashboard.faults import faults_of
+from tests.server.dashboard.browser import TABLET, WIDE, Dashboard, row_of
+from tests.server.dashboard.faults import faults_in_both_schemes, faults_of
 from tests.server.dashboard.studied import Studied
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.timeout(600)]
@@ -122,22 +122,14 @@ def test_a_diagnosis_that_is_not_there_is_said(studied_dashboard: Dashboard) -> 
     studied_dashboard.forgive()
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_axe_finds_no_fault_in_an_answer(studied: Studied, studied_dashboard: Dashboard, scheme: str) -> None:
-    page = studied_dashboard.page
-    page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
-    studied_dashboard.open(f"diagnosis/{studied.diagnosis}")
+def test_axe_finds_no_fault_in_an_answer_and_it_fits_a_tablet(studied: Studied, studied_dashboard: Dashboard) -> None:
+    page = studied_dashboard.open(f"diagnosis/{studied.diagnosis}")
     page.get_by_role("button", name="Everything behind it").click()
     expect(page.get_by_role("region", name="Remarks")).to_be_attached()
-    for summary in page.get_by_text("As a table").all():
-        summary.click()
-    assert faults_of(page) == []
-
-
-def test_on_a_tablet_nothing_is_wider_than_the_page(studied: Studied, studied_dashboard: Dashboard) -> None:
-    page = studied_dashboard.page
     page.set_viewport_size(TABLET)
-    studied_dashboard.open(f"diagnosis/{studied.diagnosis}")
-    page.get_by_role("button", name="Everything behind it").click()
     expect(page.get_by_role("region", name="Candidates evidence")).to_be_visible()
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    page.set_viewport_size(WIDE)
+    for summary in page.get_by_text("As a table").all():
+        summary.click()
+    assert faults_in_both_schemes(page) == []

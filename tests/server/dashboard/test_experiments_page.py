@@ -6,10 +6,10 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import pytest
-from playwright.sync_api import APIResponse, Browser, Locator, Page, Playwright, Request, Route, WebSocketRoute, expect
+from playwright.sync_api import APIResponse, Locator, Page, Playwright, Request, Route, WebSocketRoute, expect
 
 from tests.server.dashboard.browser import TABLET, WIDE, WITH_3D, Dashboard, MockControl, chromium, watched
-from tests.server.dashboard.faults import faults_of
+from tests.server.dashboard.faults import faults_in_both_schemes
 from tests.server.service import Service
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -277,26 +277,16 @@ def test_the_motion_is_told_in_words_where_a_browser_shows_no_3d(form: Page) -> 
     expect(form.get_by_text(re.compile(r"Joints: 1 waist 180\.0°")).first).to_be_visible()
 
 
-def test_it_fits_a_tablet(form: Page) -> None:
+def test_it_fits_a_tablet_and_axe_finds_no_fault_while_limits_are_broken(form: Page) -> None:
     form.set_viewport_size(TABLET)
     expect(form.get_by_text("motion within its limits")).to_be_visible()
     assert form.evaluate("document.documentElement.scrollWidth <= innerWidth")
     expect(form.get_by_role("button", name="Add to the queue")).to_be_in_viewport()
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_axe_finds_no_fault_while_limits_are_broken(
-    browser: Browser, served: tuple[Service, MockControl], scheme: str
-) -> None:
-    context = browser.new_context(viewport=WIDE, color_scheme=scheme)  # type: ignore[arg-type]
-    tab = watched(context, *served)
-    page = tab.open("experiments")
-    _amplitude(page).fill("200")
-    expect(page.get_by_role("list", name="Limits that the motion exceeds")).to_be_visible()
-    page.get_by_role("radio", name="Repeatedly").check()
-    found = faults_of(page)
-    context.close()
-    assert found == []
+    form.set_viewport_size(WIDE)
+    _amplitude(form).fill("200")
+    expect(form.get_by_role("list", name="Limits that the motion exceeds")).to_be_visible()
+    form.get_by_role("radio", name="Repeatedly").check()
+    assert faults_in_both_schemes(form) == []
 
 
 def test_an_experiment_that_has_ended_is_run_again_by_way_of_the_form(dashboard: Dashboard, form: Page) -> None:

@@ -20,7 +20,9 @@ def _number(text: str) -> float:
     return float(text.replace("−", "-"))
 
 
-def test_numbers_are_those_of_the_robot_with_unit_and_age(dashboard: Dashboard) -> None:
+def test_numbers_are_those_of_the_robot_with_unit_and_age_and_a_joint_that_is_hidden_stays_so(
+    dashboard: Dashboard,
+) -> None:
     page = dashboard.until_live()
     expect(page.get_by_text(re.compile(r"^\d+ ms old · tick \d+"))).to_be_visible()
     measured = dashboard.service.status()["sample"]["position"][1]
@@ -30,6 +32,10 @@ def test_numbers_are_those_of_the_robot_with_unit_and_age(dashboard: Dashboard) 
     expect(page.get_by_role("columnheader", name="Position rad")).to_be_visible()
     assert abs(_number(_cell(page, 2, 1)) - measured) < 0.01
     page.get_by_role("button", name="degrees").click()
+    page.get_by_role("button", name="J6, roll").click()
+    page.reload()
+    expect(page.get_by_role("button", name="J6, roll")).to_have_attribute("aria-pressed", "false")
+    expect(page.get_by_role("img", name="joints 1, 2, 3, 4, 5 over").first).to_be_visible()
 
 
 def test_an_experiment_is_seen_to_run_and_its_motion_in_the_numbers(dashboard: Dashboard) -> None:
@@ -86,15 +92,9 @@ def test_charts_are_drawn_with_the_past_when_the_page_is_loaded(dashboard: Dashb
     assert coloured > 60  # one line of one joint
 
 
-def test_a_joint_can_be_hidden_and_the_choice_is_kept(dashboard: Dashboard) -> None:
-    page = dashboard.until_live()
-    page.get_by_role("button", name="J6, roll").click()
-    page.reload()
-    expect(page.get_by_role("button", name="J6, roll")).to_have_attribute("aria-pressed", "false")
-    expect(page.get_by_role("img", name="joints 1, 2, 3, 4, 5 over").first).to_be_visible()
-
-
-def test_a_joint_moves_while_its_key_is_held_and_holds_when_it_is_let_go(dashboard: Dashboard) -> None:
+def test_a_joint_moves_while_its_key_is_held_and_the_gripper_closes_for_whoever_has_the_control(
+    dashboard: Dashboard,
+) -> None:
     page = dashboard.until_live()
     page.get_by_role("button", name="Take control").click()
     before = dashboard.mock.ask("state")["set_points"][0]
@@ -107,6 +107,15 @@ def test_a_joint_moves_while_its_key_is_held_and_holds_when_it_is_let_go(dashboa
     page.mouse.up()
     page.get_by_role("button", name="Keep this posture").click()
     expect(page.get_by_text("Move to J1")).to_be_visible()
+    page.get_by_role("button", name="Close", exact=True).click()
+    expect(page.get_by_text("Gripper: closed")).to_be_visible()
+    assert dashboard.service.robot.get("/process").json()["gripper"] == "closed"
+    page.get_by_role("button", name="Output 3").click()
+    expect(page.get_by_role("button", name="Output 3")).to_have_attribute("aria-pressed", "true")
+    assert dashboard.service.robot.get("/process").json()["outputs"][3]
+    page.get_by_role("button", name="Open", exact=True).click()
+    page.get_by_role("button", name="Output 3").click()
+    expect(page.get_by_role("button", name="Output 3")).to_have_attribute("aria-pressed", "false")
     page.get_by_role("button", name="Release control").click()
     expect(page.get_by_role("button", name="Take control")).to_be_visible()
     assert dashboard.service.robot.get("/control").json()["holder"] == "nobody"
@@ -150,26 +159,6 @@ def test_a_joint_is_not_driven_on_when_the_connection_was_lost_while_its_key_was
     page.get_by_role("button", name="Release control").click()
     expect(page.get_by_role("button", name="Take control")).to_be_visible()
     dashboard.forgive()
-
-
-def test_the_gripper_closes_for_whoever_has_the_control(dashboard: Dashboard) -> None:
-    page = dashboard.until_live()
-    page.get_by_role("button", name="Take control").click()
-    page.get_by_role("button", name="Close", exact=True).click()
-    expect(page.get_by_text("Gripper: closed")).to_be_visible()
-    assert dashboard.service.robot.get("/process").json()["gripper"] == "closed"
-    page.get_by_role("button", name="Output 3").click()
-    expect(page.get_by_role("button", name="Output 3")).to_have_attribute("aria-pressed", "true")
-    assert dashboard.service.robot.get("/process").json()["outputs"][3]
-    page.get_by_role("button", name="Open", exact=True).click()
-    page.get_by_role("button", name="Output 3").click()
-    expect(page.get_by_role("button", name="Output 3")).to_have_attribute("aria-pressed", "false")
-    page.get_by_role("button", name="Release control").click()
-
-
-def test_where_there_is_no_3d_the_arm_is_told_in_words(dashboard: Dashboard) -> None:
-    page = dashboard.until_live()
-    expect(page.get_by_text("This browser shows no 3-D")).to_be_visible()
 
 
 def test_the_system_page_tells_health_storage_and_what_happened(dashboard: Dashboard) -> None:

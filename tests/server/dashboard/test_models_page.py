@@ -5,8 +5,8 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from tests.server.dashboard.browser import TABLET, Dashboard, row_of
-from tests.server.dashboard.faults import faults_of
+from tests.server.dashboard.browser import TABLET, WIDE, Dashboard, row_of
+from tests.server.dashboard.faults import faults_in_both_schemes
 from tests.server.dashboard.studied import Studied
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.timeout(600)]
@@ -67,11 +67,11 @@ def test_the_validation_shows_its_sum_and_its_curves(studied: Studied, studied_d
 def test_a_comparison_is_begun_here_and_its_result_shown(studied: Studied, studied_dashboard: Dashboard) -> None:
     page = studied_dashboard.open(f"models/{studied.model}")
     page.get_by_role("button", name="Compare…").click()
-    row_of(page, studied.traces[1]).get_by_role("radio", name="Use").check()
+    row_of(page, studied.traces[1]).get_by_role("radio", name="Use", exact=True).check()
     page.get_by_role("button", name="Start", exact=True).click()
     expect(page.get_by_role("region", name=re.compile("^Agreement"))).to_be_visible()
     expect(page.get_by_role("img", name=re.compile("^Position of joint 1"))).to_be_visible()
-    expect(page.get_by_role("tree")).to_contain_text("Comparison")
+    expect(page.get_by_role("tree")).to_contain_text("Simulation")
     job = page.url.rpartition("/")[2]
     assert studied.service.robot.get(f"/jobs/{job}").json()["request"]["models"] == ["machine", studied.model]
 
@@ -101,20 +101,12 @@ def test_what_the_service_refuses_is_said_beside_the_form(studied: Studied, stud
     studied_dashboard.forgive()
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_axe_finds_no_fault_in_a_model(studied: Studied, studied_dashboard: Dashboard, scheme: str) -> None:
-    page = studied_dashboard.page
-    page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
-    studied_dashboard.open(f"models/{studied.model}")
-    expect(page.get_by_role("region", name=re.compile("^Validation"))).to_be_visible()
-    page.get_by_role("button", name="Fit…").click()
-    expect(page.get_by_role("button", name="Start", exact=True)).to_be_visible()
-    assert faults_of(page) == []
-
-
-def test_on_a_tablet_nothing_is_wider_than_the_page(studied: Studied, studied_dashboard: Dashboard) -> None:
-    page = studied_dashboard.page
+def test_axe_finds_no_fault_in_a_model_and_it_fits_a_tablet(studied: Studied, studied_dashboard: Dashboard) -> None:
+    page = studied_dashboard.open(f"models/{studied.model}")
     page.set_viewport_size(TABLET)
-    studied_dashboard.open(f"models/{studied.model}")
     expect(page.get_by_role("region", name=re.compile("^Validation"))).to_be_visible()
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    page.set_viewport_size(WIDE)
+    page.get_by_role("button", name="Fit…").click()
+    expect(page.get_by_role("button", name="Start", exact=True)).to_be_visible()
+    assert faults_in_both_schemes(page) == []

@@ -58,7 +58,9 @@ def until_one(page: Page, requests: list[Route]) -> None:
         page.wait_for_timeout(20)
 
 
-def test_a_pressed_stop_freezes_the_board_before_it_is_let_go(dashboard: Dashboard) -> None:
+def test_a_pressed_stop_freezes_the_board_before_it_is_let_go_and_is_past_once_somebody_has_ended_it(
+    dashboard: Dashboard,
+) -> None:
     page = dashboard.until_live()
     assert not dashboard.mock.ask("state")["frozen"]
     button = page.get_by_role("button", name="STOP")
@@ -74,6 +76,9 @@ def test_a_pressed_stop_freezes_the_board_before_it_is_let_go(dashboard: Dashboa
     )
     expect(page.locator("[data-stop]").get_by_text("The arm is stopped.")).to_be_visible()
     expect(page.locator("[data-banner]")).not_to_be_attached()  # all is said once
+    assert reset(dashboard.service.robot).status_code == 200
+    expect(page.locator("[data-stop=past]")).to_contain_text("Past: stopped at")
+    expect(page.locator(CONFIRMED)).not_to_be_attached()
 
 
 def test_the_key_stops_also_while_somebody_types(dashboard: Dashboard) -> None:
@@ -168,13 +173,3 @@ def test_a_late_answer_to_a_reset_does_not_hide_a_stop_that_was_pressed_meanwhil
     stops[0].continue_()
     expect(page.locator(CONFIRMED)).to_be_visible()
     assert dashboard.mock.ask("state")["frozen"]
-
-
-def test_a_stop_that_somebody_else_has_ended_is_not_called_confirmed_any_more(dashboard: Dashboard) -> None:
-    page = dashboard.until_live()
-    page.keyboard.press("F8")
-    expect(page.locator(CONFIRMED)).to_be_visible()
-    expect(page.get_by_text("The arm is stopped.")).to_be_visible()
-    assert reset(dashboard.service.robot).status_code == 200
-    expect(page.locator("[data-stop=past]")).to_contain_text("Past: stopped at")
-    expect(page.locator(CONFIRMED)).not_to_be_attached()

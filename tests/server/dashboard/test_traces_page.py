@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, Locator, Page, expect
+from playwright.sync_api import Locator, Page, expect
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import load_machine
 from daq.contracts.trace import Floats, Trace, TraceRecord
 from daq.traces.store import write_trace
-from tests.server.dashboard.browser import TABLET, WIDE, Dashboard, MockControl, watched
-from tests.server.dashboard.faults import faults_of
+from tests.server.dashboard.browser import TABLET, WIDE, Dashboard, MockControl
+from tests.server.dashboard.faults import faults_in_both_schemes, faults_of
 from tests.server.service import Service
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -208,23 +208,14 @@ def test_a_trace_that_is_not_there_is_told(dashboard: Dashboard) -> None:
     dashboard.forgive()
 
 
-def test_it_fits_a_tablet(dashboard: Dashboard, traces: tuple[str, str]) -> None:
-    page = dashboard.open(f"traces/{traces[0]}")
+def test_axe_finds_no_fault_with_traces_shown_and_they_fit_a_tablet(
+    dashboard: Dashboard, traces: tuple[str, str]
+) -> None:
+    page = dashboard.open(f"traces/{traces[0]},{traces[1]}")
     page.set_viewport_size(TABLET)
     expect(_chart(page)).to_be_visible()
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_axe_finds_no_fault_with_traces_shown(
-    browser: Browser, served: Served, traces: tuple[str, str], scheme: str
-) -> None:
-    context = browser.new_context(viewport=WIDE, color_scheme=scheme)  # type: ignore[arg-type]
-    tab = watched(context, *served)
-    page = tab.open(f"traces/{traces[0]},{traces[1]}")
-    expect(_chart(page)).to_be_visible()
+    page.set_viewport_size(WIDE)
     page.get_by_role("button", name="Measure").click()
     expect(page.get_by_role("region", name="Between the cursors").get_by_role("table")).to_be_visible()
-    found = faults_of(page)
-    context.close()
-    assert found == []
+    assert faults_in_both_schemes(page) == []

@@ -8,6 +8,7 @@ from pydantic import TypeAdapter
 from model.discrepancy.explanation.answer_words import headline
 from model.discrepancy.thresholds import THRESHOLDS
 from server.jobs.results import JobResult
+from tests.server.dashboard.studied import done
 from tests.server.service import Service
 
 RAMP: dict[str, Any] = {"spec": {"name": "ramp"}}
@@ -28,12 +29,7 @@ def ramps(sound_service: Service) -> tuple[str, str]:
 
 def result_of(service: Service, request: dict[str, Any]) -> tuple[dict[str, Any], Any]:
     """A job that is done, and its result, which is as its type says."""
-    answer = service.robot.post("/jobs", json=request)
-    assert answer.status_code == 201, answer.text
-    job: dict[str, Any] = answer.json()
-    while job["state"] in ("queued", "running"):
-        job = service.robot.get(f"/jobs/{job['id']}", params={"wait": 5}).json()
-    assert (job["state"], job["reason"]) == ("done", "")
+    job = done(service, request)
     result = RESULTS.validate_json(service.robot.get(f"/jobs/{job['id']}/result").content)
     assert (result.id, result.kind) == (job["id"], request["kind"])
     return job, result.data

@@ -80,15 +80,6 @@ def test_an_experiment_is_told_from_the_queue_to_its_end(service: Service) -> No
     assert fractions == sorted(fractions)
 
 
-def test_a_stop_is_seen_by_whoever_watches(service: Service) -> None:
-    with watching(service, subscribe=["robot", "events"]) as socket:
-        service.robot.post("/stop")
-        for message in messages(socket, "robot"):
-            if message.arm == "stopped":
-                break
-    assert service.status()["arm"] == "stopped"
-
-
 def test_what_is_not_understood_is_refused_in_one_line_and_the_stream_goes_on(service: Service) -> None:
     with watching(service, subscribe=["robot"]) as socket:
         for text in ("{", "[]", b"{}", b"\xff", '{"subscribe":["everything"]}', '{"rate":7}', '{"shell":"ls"}'):

@@ -5,6 +5,8 @@ from collections.abc import Callable
 
 import pytest
 
+from daq.contracts.service.robot import RobotIdentity
+from daq.owner.messages import Opened
 from server.queue.context import ATTENDANCE
 from server.queue.service import QueueService
 from server.robot.control import LEASE_TIME
@@ -13,6 +15,8 @@ from tests.server.queue.bench import CALM, REAL, TOO_LONG, Bench
 LOOK = "look at the arm, then resume the queue"
 ASKS = "an operator must allow the queue to move this arm: pause it, then resume it (moves_real_arm)"
 LOST = CALM.model_copy(update={"link": "lost"})
+
+OPENED = Opened(identity=RobotIdentity(simulated=True, protocol=2, period=0.02, boots=1))
 
 
 def _is_held(bench: Bench, reason: str) -> None:
@@ -169,9 +173,11 @@ def test_an_attempt_to_connect_that_fails_holds_nothing(bench: Bench) -> None:
 
 
 def test_connecting_moves_nothing_whatever_waits(bench: Bench) -> None:
+    bench.queue.on_report(OPENED)
+    assert not bench.queue.status().paused
     bench.submit()
     bench.submit()
-    bench.queue.connection_made()
+    bench.queue.on_report(OPENED)
     _is_held(bench, f"the robot was connected while 2 experiments waited: {LOOK}")
 
 

@@ -4,15 +4,13 @@ from datetime import timedelta
 
 import pytest
 
-from daq.contracts.service.robot import RobotIdentity
 from daq.contracts.trace import TraceEvent
-from daq.owner.messages import EventHappened, Opened, Progress
+from daq.owner.messages import EventHappened
 from server.problems import ProblemError
 from server.queue.context import ATTENDANCE
 from tests.server.queue.bench import CALM, REAL, SPEC, Bench, done
 
 LOOK = "look at the arm, then resume the queue"
-OPENED = Opened(identity=RobotIdentity(simulated=True, protocol=2, period=0.02, boots=1))
 
 
 def test_what_becomes_of_an_experiment_is_told_with_its_number_and_whoever_asked_for_it(bench: Bench) -> None:
@@ -121,39 +119,6 @@ def test_whoever_has_control_keeps_the_queue_waiting(bench: Bench) -> None:
     assert not bench.queue.status().paused
     bench.control.give_back(lease)
     bench.until(lambda event: event == f"queue: paused: anna gave control back while 1 experiment waited: {LOOK}")
-
-
-def test_a_queue_that_meets_an_error_says_so(bench: Bench) -> None:
-    def fails() -> None:
-        raise RuntimeError("a bug")
-
-    bench.experiments.before("due", fails)
-    bench.submit()
-    bench.queue.start()
-    bench.until_it_waits("an error occurred in the queue: see the log")
-    bench.queue.wake()
-    bench.until(lambda event: event == "experiment: failed: refused")
-
-
-def test_reports_of_the_owner_reach_the_queue(bench: Bench) -> None:
-    bench.answer = None
-    made = bench.submit()
-    bench.queue.start()
-    bench.moves.wait()
-    bench.queue.on_report(Progress(fraction=0.5, text="moving"))
-    running = bench.queue.running
-    assert running is not None
-    assert (running.id, running.progress, running.text) == (made.id, 0.5, "moving")
-    bench.queue.on_report(CALM.model_copy(update={"link": "lost"}))
-    assert bench.queue.status().reason == f"the link to the robot was lost: {LOOK}"
-
-
-def test_a_robot_that_is_connected_pauses_the_queue_only_while_work_waits(bench: Bench) -> None:
-    bench.queue.on_report(OPENED)
-    assert not bench.queue.status().paused
-    bench.submit()
-    bench.queue.on_report(OPENED)
-    assert bench.queue.status().reason == f"the robot was connected while 1 experiment waited: {LOOK}"
 
 
 def test_an_event_of_the_robot_makes_the_queue_look_again(bench: Bench) -> None:

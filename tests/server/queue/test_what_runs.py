@@ -9,6 +9,7 @@ from server.queue.context import ATTENDANCE
 from tests.server.meanwhile import raising
 from tests.server.queue.bench import AT_ONCE, FULL, REAL, TOO_LONG, Bench, done
 
+REFUSED = Answer(number=1, problem="refused", exit_code=2)
 STOPPED = Answer(number=1, problem="the arm has been stopped", exit_code=6)
 LOOK = "look at the arm, then resume the queue"
 
@@ -96,12 +97,17 @@ def test_a_run_that_the_end_of_the_service_stops_was_lost(bench: Bench) -> None:
     assert (ended.state, ended.reason) == ("interrupted", "the service was shut down while this ran")
 
 
-def test_a_run_that_ends_well_lets_the_next_begin(bench: Bench) -> None:
-    bench.answer = done()
-    one, other = bench.submit(), bench.submit()
+@pytest.mark.parametrize(
+    ("answer", "said", "state"), [(done(), "completed", "done"), (REFUSED, "failed: refused", "failed")]
+)
+def test_a_run_that_ends_well_or_was_refused_lets_the_next_begin(
+    bench: Bench, answer: Answer, said: str, state: str
+) -> None:
+    bench.answer = answer
+    both = bench.submit(), bench.submit()
     bench.queue.start()
-    bench.until(lambda _: bench.events.count("experiment: completed") == 2)
-    assert [bench.experiments.get("ma2000", each.id).state for each in (one, other)] == ["done", "done"]
+    bench.until(lambda _: bench.events.count(f"experiment: {said}") == 2)
+    assert [bench.experiments.get("ma2000", each.id).state for each in both] == [state, state]
     assert not bench.queue.status().paused
     assert bench.looked_for_traces == 0
 
@@ -162,22 +168,13 @@ def test_one_that_cannot_be_begun_leaves_the_robot_free_and_is_tried_again(bench
 def test_an_end_that_is_written_already_is_not_written_again(bench: Bench) -> None:
     identity = _running(bench)
     bench.experiments.end("ma2000", identity, Event.COMPLETED, bench.clock.utc(), "by hand", "complete")
-    bench.asked.set_result(Answer(number=1, problem="refused", exit_code=2))
+    bench.asked.set_result(REFUSED)
     bench.until(lambda event: event == "experiment: failed: refused")
     assert bench.experiments.get("ma2000", identity).reason == "by hand"
     bench.answer = done()
     following = bench.submit()
     bench.until(lambda event: event == "experiment: completed")
     assert bench.experiments.get("ma2000", following.id).state == "done"
-
-
-def test_one_that_was_refused_left_no_trace_and_holds_nothing(bench: Bench) -> None:
-    made, following = bench.submit(), bench.submit()
-    bench.queue.start()
-    bench.until(lambda _: bench.events.count("experiment: failed: refused") == 2)
-    assert bench.looked_for_traces == 0
-    assert [bench.experiments.get("ma2000", each.id).state for each in (made, following)] == ["failed", "failed"]
-    assert not bench.queue.status().paused
 
 
 def test_a_service_that_ends_begins_nothing_more(bench: Bench) -> None:

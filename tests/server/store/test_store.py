@@ -176,15 +176,6 @@ def test_traces_are_found_by_joints_that_moved_and_by_what_the_newest_diagnosis_
     assert _found(traces, effect="backlash") == [2, 1]
 
 
-def test_a_file_that_is_gone_is_marked_and_comes_back(store: Store) -> None:
-    traces = TraceStore(store)
-    traces.insert("ma2000", new_trace(1))
-    traces.mark_missing("ma2000", ["1.mcap"], missing=True)
-    assert traces.get("ma2000", f"{1:012x}").missing
-    traces.mark_missing("ma2000", ["1.mcap"], missing=False)
-    assert not traces.get("ma2000", f"{1:012x}").missing
-
-
 def test_a_spec_and_long_notes_come_back_as_they_were_given(store: Store) -> None:
     experiments, traces = ExperimentStore(store), TraceStore(store)
     spec = ExperimentSpec.model_validate({"trajectory": {"kind": "sine", "amplitude": {1: 0.1}}, "joints": [1]})
@@ -233,7 +224,7 @@ def test_the_same_model_belongs_to_each_robot_and_its_file_to_the_last(store: St
     assert deleted == ["m1.json"]
 
 
-def test_files_of_one_robot_are_not_missing_in_the_folder_of_another(store: Store) -> None:
+def test_files_of_one_robot_are_not_missing_in_the_folder_of_another_and_come_back(store: Store) -> None:
     traces = TraceStore(store)
     traces.insert("left", new_trace(1))
     traces.insert("right", new_trace(2))
@@ -241,3 +232,5 @@ def test_files_of_one_robot_are_not_missing_in_the_folder_of_another(store: Stor
     traces.mark_missing("left", {"1.mcap", "2.mcap"}, missing=True)
     assert traces.get("left", f"{1:012x}").missing
     assert not traces.get("right", f"{2:012x}").missing
+    traces.mark_missing("left", ["1.mcap"], missing=False)
+    assert not traces.get("left", f"{1:012x}").missing

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-from mcap.writer import Writer
 from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
+from rosbags.rosbag2 import CompressionFormat, CompressionMode
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
@@ -21,6 +20,7 @@ from extras.formats.bags.bag_process import import_bag_apart
 from extras.formats.bags.joint_messages import JOINT_STATE
 from extras.formats.bags.ros_bag import import_bag
 from tests.daq.traces.file_fuzz import CASES, LIMITS, ROWS, Kind, campaign
+from tests.extras.formats.bags.test_bags_that_lack_something import mcap
 from tests.extras.formats.bags.test_ros_bag import bag, state
 
 MIB = 1 << 20
@@ -87,44 +87,6 @@ def test_an_error_comes_back_in_its_own_words(tmp_path: Path) -> None:
 # ---- damaged bags (`tests.daq.traces.file_fuzz`)
 
 
-def _bag(folder: Path, kind: str) -> Path:
-    """A bag of joint states of two joints that move, written by its own library."""
-    store: Any = get_typestore(Stores.ROS1_NOETIC if kind == "ROS 1" else Stores.ROS2_JAZZY)
-    types = store.types
-    messages = []
-    for number in range(ROWS):
-        moment = 1_700_000_000 * 10**9 + number * 10**7
-        stamp = types["builtin_interfaces/msg/Time"](sec=moment // 10**9, nanosec=moment % 10**9)
-        own = {"seq": number} if kind == "ROS 1" else {}
-        header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="", **own)
-        values = {name: np.array([0.1 * number, -0.2 * number]) for name in ("position", "velocity", "effort")}
-        message = types[JOINT_STATE](header=header, name=["pan", "lift"], **values)
-        write = store.serialize_ros1 if kind == "ROS 1" else store.serialize_cdr
-        messages.append((moment, bytes(write(message, JOINT_STATE))))
-    if kind == "ROS 1":
-        with Writer1(folder / "a.bag") as old:
-            connection = old.add_connection("/joint_states", JOINT_STATE, typestore=store)
-            for moment, data in messages:
-                old.write(connection, moment, data)
-        return folder / "a.bag"
-    if kind == "MCAP":
-        with (folder / "a.mcap").open("wb") as stream:
-            writer = Writer(stream, chunk_size=2000, enable_data_crcs=True)
-            writer.start("ros2", "fuzz")
-            channel = writer.register_channel(
-                "/joint_states", "cdr", writer.register_schema(JOINT_STATE, "ros2msg", b"")
-            )
-            for moment, data in messages:
-                writer.add_message(channel, moment, data, moment)
-            writer.finish()  # type: ignore[no-untyped-call]
-        return folder / "a.mcap"
-    with Writer2(folder / "a", version=9, storage_plugin=StoragePlugin.SQLITE3) as new:
-        connection2 = new.add_connection("/joint_states", JOINT_STATE, typestore=store)
-        for moment, data in messages:
-            new.write(connection2, moment, data)
-    return folder / "a"
-
-
 def _read_bag(path: Path) -> Trace:
     return import_bag(path, LIMITS, Choice(drive_unit="N·m"))
 
@@ -132,16 +94,18 @@ def _read_bag(path: Path) -> Trace:
 def kinds(folder: Path) -> list[Kind]:
     """A sound bag of every kind, each in a folder of its own."""
     found = []
-    for name, kind, inside in (
-        ("bag of ROS 1", "ROS 1", ""),
-        ("bag of MCAP", "MCAP", ""),
-        ("bag of SQLite", "SQLite", "a.db3"),
-        ("metadata of a bag", "SQLite", "metadata.yaml"),
-    ):
+    moving: list[dict[str, Any]] = [{"velocity": [0.1, 0.2]}] * ROWS
+    makers: tuple[tuple[str, Callable[[Path], Path], str], ...] = (
+        ("bag of ROS 1", lambda place: bag(place / "a.bag", moving, "ros1"), ""),
+        ("bag of MCAP", lambda place: mcap(place / "a.mcap", ROWS), ""),
+        ("bag of SQLite", lambda place: bag(place / "a", moving, "sqlite3"), "a.db3"),
+        ("metadata of a bag", lambda place: bag(place / "a", moving, "sqlite3"), "metadata.yaml"),
+    )
+    for name, make, inside in makers:
         (folder / name).mkdir()
-        bag = _bag(folder / name, kind)
-        changed = bag / inside if inside else bag
-        found.append(Kind(name, bag, changed, _read_bag, changed.read_bytes()))
+        made = make(folder / name)
+        changed = made / inside if inside else made
+        found.append(Kind(name, made, changed, _read_bag, changed.read_bytes()))
     return found
 
 
