@@ -7,7 +7,7 @@ from statistics import pstdev
 
 import pytest
 
-from firmware_protocol.commands import Advance, Hello, ReadStatus, Sample, Snapshot, Status, StatusFlag
+from firmware_protocol.commands import Advance, ReadStatus, Sample, Snapshot, Status, StatusFlag
 from firmware_protocol.commands import WriteSetPoints as Write
 from firmware_protocol.joints import ALL_JOINTS, JointReading
 from mock_controller.faults.fault import FaultError, fields_of
@@ -257,15 +257,3 @@ def test_a_stalled_joint_stays_where_it_is_and_comes_free_again() -> None:
     host.device.faults.switch_off("stalled_joint")
     host.ask(Advance(1_000_000))
     assert host.board.plant.joint_angles[0] > angle + 0.1
-
-
-def test_a_brown_out_restarts_the_board_where_the_arm_is() -> None:
-    host = LockStepHost(fault=("brown_out:start=0.5",))
-    host.ask(Hello(2, 1))
-    host.ask(Write(((1, 540),)))
-    host.ask(Advance(700_000))
-    assert host.board.counters.boots == 2
-    (snapshot,) = sampled(host, 1)
-    assert snapshot.status & StatusFlag.RESTARTED
-    assert 500 < dict(snapshot.joints)[1].set_point < 545
-    assert host.device.faults.counts() == {"brown_out": {"board": 1}}

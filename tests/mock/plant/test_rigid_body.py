@@ -101,14 +101,6 @@ def test_a_hard_gear_is_a_rigid_one_and_one_too_hard_for_the_step_is_refused() -
         Plant(default_plant(), build_modifications([("joint_compliance", {"joint": 6, "compliance": 1e-3})]))
 
 
-def test_dead_zone_swallows_small_voltages_and_shortens_large_ones() -> None:
-    plant = Plant(default_plant(), build_modifications([("dead_zone", {"joint": 2, "width": 2.0})]))
-    plant.advance([0.05, 0.05, 0, 0, 0, 0], 1000)
-    assert plant.motor_volts[:2] == pytest.approx((1.4, 0.0))
-    plant.advance([0.5, -0.5, 0, 0, 0, 0], 1000)
-    assert plant.motor_volts[:2] == pytest.approx((14.0, -12.0))
-
-
 @pytest.mark.parametrize(
     ("name", "values", "says"),
     [
