@@ -108,18 +108,6 @@ def test_separation_grows_with_the_effect_and_is_looked_at_while_others_act(know
     assert first.d_prime == pytest.approx(alone.d_prime, rel=0.2)
 
 
-def test_tangents_kept_in_a_folder_are_read_from_there(tmp_path: Path, known: Tangents) -> None:
-    kept = tmp_path / "tangents"
-    tiny = Experiment(short().set_points[:3], settle=1)
-    first = tangents(default_plant(), default_board(), tiny, cache=kept)
-    (file,) = kept.iterdir()
-    written = file.stat().st_mtime_ns
-    again = tangents(default_plant(), default_board(), tiny, cache=kept)
-    assert file.stat().st_mtime_ns == written
-    assert again.names == first.names
-    assert np.array_equal(again.matrix, first.matrix)
-
-
 def test_the_command_prints_a_line_an_arm(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table = tmp_path / "experiment.csv"
     rows = [",".join(map(str, row)) for row in short().set_points[:20]]
