@@ -8,8 +8,7 @@ import pytest
 import typer
 
 from daq.contracts.experiment import ExperimentSpec
-from daq.contracts.service.robot import RobotStatus
-from daq.contracts.status import StatusReport, report_of
+from daq.contracts.status import StatusReport
 from daq.trajectories.presets import PRESETS
 from model.fitting.fitted import FittedParameter
 from tests.daq.servo_bench import PAN_TILT
@@ -67,25 +66,6 @@ def test_a_local_status_with_another_machines_file_shows_no_angles(
     daq("--port", port, "status").complains(4, "has 6 joints, the machine file pan_tilt describes 2")
 
 
-def test_a_services_status_is_reported_completely() -> None:
-    moment = "2026-01-01T00:00:00Z"
-    data = {
-        "robot": "ma2000",
-        "machine": "ma2000",
-        "port": "mock://",
-        "connection": "lost",
-        "arm": "disconnected",
-        "activity": "none",
-        "link": {"state": "none"},
-        "control": {"holder": "nobody"},
-        "utc": moment,
-        "queue": {"paused": True, "reason": "no arm", "since": moment, "queued": 2},
-    }
-    status = RobotStatus.model_validate(data)
-    told = report_of(status, "http://arm:8300").model_dump(mode="json")
-    assert told == {"server": "http://arm:8300", **status.model_dump(mode="json")}
-
-
 def test_reset_presets_and_configuration_are_printed_as_json(daq: CommandLine, port: str) -> None:
     reset = json.loads(daq("--port", port, "reset", "--json").out)
     assert reset == {"server": None, "here": False, "text": "was not stopped"}
@@ -105,11 +85,6 @@ def test_imported_exported_and_plotted_traces_are_printed_as_json(daq: CommandLi
     assert exported == {"trace": made["file"], "file": "again.csv"}
     drawn = json.loads(daq("traces", "plot", made["file"], "-o", "rig.html", "--json").out)
     assert Path(drawn["file"]).is_file()
-
-
-@pytest.mark.parametrize("words", ["run preset nonsense --json", "traces show nothing --json"])
-def test_a_failing_command_prints_no_json(daq: CommandLine, words: str) -> None:
-    daq(*words.split()).complains(2)
 
 
 # ---- tables of 80 columns
