@@ -253,10 +253,6 @@ def test_what_is_like_it_is_refused_before_anything_is_asked(word: object) -> No
                 say()
 
 
-def test_only_given_consent_moves_a_real_arm() -> None:
-    assert (Consent(True).moves_real_arm, Consent().moves_real_arm) == (True, False)
-
-
 # ---- What the line to a controller can give, as a status has it, and as people read it
 
 LINK = LinkStatus(state="connected", counters={"requests": 7.0}, age=0.5)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.interpolate import CubicSpline, PPoly
+from scipy.interpolate import PPoly
 
 from daq.contracts.errors import SpecError
 from daq.contracts.trace import Floats
@@ -115,18 +115,6 @@ def test_the_4_3_4_meets_its_fourteen_conditions(knots: list[float], durations: 
         assert [value[0][0], value[2][1]] == pytest.approx([0, 0], abs=1e-8 * scale)
         assert [value[0][1], value[1][1]] == pytest.approx([value[1][0], value[2][0]], abs=1e-8 * scale)
     assert evaluate(pieces, times, ends)[:, 0] == pytest.approx(knots, abs=1e-9)
-
-
-def test_a_4_3_4_of_equal_parts_agrees_with_the_spline_that_has_its_rates() -> None:
-    """Its cubic is the one cubic between its own speeds; scipy builds that from them."""
-    times = np.array([1.0, 2.0, 1.0])
-    pieces = polynomials(np.array([[0.0], [0.2], [0.9], [0.7]]), times)
-    knots = np.array([1.0, 3.0])
-    speeds = evaluate(pieces, times, knots - np.array([1e-12, 0.0]), 1)[:, 0]
-    between = CubicSpline(knots, [0.2, 0.9], bc_type=((1, speeds[0]), (1, speeds[1])))
-    time = np.linspace(1.0, 3.0, 41)
-    assert evaluate(pieces, times, time[:-1])[:, 0] == pytest.approx(between(time[:-1]), abs=1e-9)
-    assert evaluate(pieces, times, time[:-1], 2)[:, 0] == pytest.approx(between(time[:-1], 2), abs=1e-8)
 
 
 def pick_and_place(**own: object) -> dict[str, object]:
