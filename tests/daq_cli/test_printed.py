@@ -8,7 +8,6 @@ import pytest
 import typer
 
 from daq.contracts.experiment import ExperimentSpec
-from daq.contracts.status import StatusReport
 from daq.trajectories.presets import PRESETS
 from model.fitting.fitted import FittedParameter
 from tests.daq.servo_bench import PAN_TILT
@@ -46,17 +45,6 @@ def test_every_option_has_a_help_text() -> None:
         if isinstance(parameter, typer.core.TyperOption | typer.core.TyperArgument) and not parameter.help
     ]
     assert silent == []
-
-
-def test_a_local_status_has_the_fields_of_a_service(daq: CommandLine, port: str) -> None:
-    said = daq("--port", port, "status", "--json")
-    assert said.code == 0, said.err
-    found = StatusReport.model_validate_json(said.out)
-    assert (found.server, found.queue, found.control) == (None, None, None)
-    assert found.sample is not None
-    assert found.identity is not None
-    assert (found.connection, found.arm, found.sample.joints) == ("connected", "idle", (1, 2, 3, 4, 5, 6))
-    assert "missed_set_points" in found.link.counters
 
 
 def test_a_local_status_with_another_machines_file_shows_no_angles(

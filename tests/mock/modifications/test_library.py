@@ -1,6 +1,7 @@
 """The library of effects as a whole; and, one by one, effects that models do not have, or not in the mock's shape.
 
-All others move the mock as they move the model: `tests/model/trial/test_conventions.py`.
+All others move the mock as they move the model (`tests/model/trial/test_conventions.py`), or have records of theirs
+among the golden answers (`benchmarks/golden`).
 """
 
 import dataclasses
@@ -155,21 +156,6 @@ def test_a_winding_warmed_from_outside_loses_torque_with_time_and_not_with_curre
         )
 
 
-def test_an_amplifier_climbs_so_much_a_step_and_shares_volts_with_another_drive() -> None:
-    # Slew rate lets the output climb so much a step
-    plant = plant_with(effect("amplifier_slew_rate", joint=1, time_per_volt=1e-3))
-    plant.advance([0.5, 0.5, 0, 0, 0, 0], 3000)
-    assert plant.motor_volts[:2] == pytest.approx((3.0, 14.0))
-    plant.advance([0.5, 0.5, 0, 0, 0, 0], 20_000)
-    assert plant.motor_volts[:2] == pytest.approx((14.0, 14.0))
-    # Coupled drives share volts in one direction
-    plant = plant_with(effect("drive_coupling", joint=1, onto=2, share=0.1))
-    plant.advance([0.5, 0, 0, 0, 0, 0], 1000)
-    assert plant.motor_volts[:3] == pytest.approx((14.0, 1.4, 0.0))
-    plant.advance([0, 0.5, 0, 0, 0, 0], 1000)
-    assert plant.motor_volts[:3] == pytest.approx((0.0, 14.0, 0.0))
-
-
 def test_stiction_holds_a_joint_until_the_breakaway_torque_and_lets_it_go_then() -> None:
     def moved(torque: float, *modifications: Any) -> float:
         """How far the waist has come while its motor's torque rose slowly to so many N·m."""
@@ -187,12 +173,6 @@ def test_stiction_holds_a_joint_until_the_breakaway_torque_and_lets_it_go_then()
     assert 0.3 * moved(12.0) < moved(12.0, bond()) < 0.95 * moved(12.0)
 
 
-def test_a_tight_spot_resists_most_at_its_centre() -> None:
-    spot = effect("tight_spot", joint=1, coefficient=10.0, centre=0.5, width=0.1)
-    for angle, rate, torque in ((0.5, 0.3, -3.0), (0.6, -0.3, 3.0 * math.exp(-0.5)), (1.2, 0.3, 0.0)):
-        assert spot.joint_torque(0.0, angle, rate) == pytest.approx(torque, abs=1e-9)
-
-
 def test_cogging_has_steeper_flanks_than_a_ripple_of_its_size_and_number() -> None:
     steepest = []
     for name in ("torque_ripple", "detent_cogging"):
@@ -201,21 +181,6 @@ def test_cogging_has_steeper_flanks_than_a_ripple_of_its_size_and_number() -> No
         assert max(values) == pytest.approx(2.0, rel=0.35)
         steepest.append(max(b - a for a, b in itertools.pairwise(values)))
     assert steepest[1] > 2 * steepest[0]
-
-
-def test_a_cable_remembers_where_it_was_and_ageing_friction_how_long_it_rested() -> None:
-    cable = effect("cable_hysteresis", joint=1, torque=2.0, reach=0.1)
-    there = [cable.joint_torque(0.0, 0.0, 1.0) for _ in range(100)]  # 0.1 rad
-    assert there[-1] == pytest.approx(-2.0 * (1 - math.exp(-1.0)), rel=1e-6)
-    back = [cable.joint_torque(0.0, 0.0, -1.0) for _ in range(100)]
-    assert back[-1] > 0.0 > back[0]
-    ageing = effect("ageing_friction", joint=1, torque=1.0, onset=0.1, memory=3e-3)
-    for _ in range(900):
-        rested = ageing.friction_level(0.5, 0.0, 0.0)
-    assert rested == pytest.approx(0.5 + math.log(1 + 0.9 / 0.1), rel=1e-3)
-    for _ in range(100):
-        moving = ageing.friction_level(0.5, 0.0, 0.3)
-    assert moving == pytest.approx(0.5 + math.log1p(3e-3 / 0.3 / 0.1), rel=1e-3)
 
 
 G = 9.81
@@ -246,14 +211,6 @@ def sensor(name: str, **values: Any) -> Any:
 def board_with(*requests: tuple[str, dict[str, Any]], seed: int = 1) -> Board:
     modifications = build_modifications(requests)
     return Board(default_board(), default_memory_map(), Plant(default_plant(), modifications), seed, modifications)
-
-
-def test_a_zero_that_drifts_is_at_its_end_exponentially() -> None:
-    drifting = sensor("potentiometer_zero_drift", joint=1, drift=0.02, time_constant=2.0)
-    shown = [drifting.sensed_angle(1.0) for _ in range(1001)]
-    assert shown[0] == 1.0
-    assert shown[100] == pytest.approx(1.0 + 0.02 * (1 - math.exp(-1.0)), rel=1e-6)
-    assert shown[-1] == pytest.approx(1.02, abs=1e-5)
 
 
 @pytest.mark.parametrize("sign", [1, -1])
