@@ -213,20 +213,6 @@ def test_a_diagnosis_that_gives_no_answer_says_why(tmp_path: Path, done: Campaig
     assert silent._score(SECRETS[0])["place"] == "failed"
 
 
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (("--seeds", "9:1"), "write FIRST:LAST"),
-        (("--seeds", "1:2", "--kinds", "dirty"), "kind 'dirty': allowed are clean"),
-        (("--seeds", "1:2", "--loads", "none"), "load 'none': allowed are nominal"),
-        ((), "--seeds or --registration"),
-        (("--registration", "nowhere.toml"), "nowhere.toml: cannot be read"),
-    ],
-)
-def test_wrong_options_are_refused_in_one_line(daq: CommandLine, words: tuple[str, ...], says: str) -> None:
-    daq("blind", "--folder", "trial", *words).complains(2, says)
-
-
 def test_hashes_prints_the_tables_of_a_registration(daq: CommandLine) -> None:
     printed = tomllib.loads(daq("blind", "--folder", "trial", "--hashes").out)
     expected = tree_hashes()
