@@ -10,6 +10,8 @@ from daq.link import RequestRefusedError
 from firmware_protocol.commands import Capability, Refusal, StatusFlag
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.units import counts_to_posture
+from tests.contract.untorn_stop import NEAR as TORN
+from tests.contract.untorn_stop import frozen_far_away
 
 pytestmark = pytest.mark.motion
 STEP = 4
@@ -154,3 +156,8 @@ def test_nothing_is_missed_when_the_bridge_keeps_out_of_the_way(controller: Cont
         towards = {joint: posture + step % STEP for joint, posture in start.items()}
         snapshot = controller.next_snapshot(snapshot.tick, JOINTS, towards)
     assert controller.counters.missed_set_points == 0
+
+
+def test_a_stop_never_freezes_a_torn_position(controller: Controller) -> None:
+    if Capability.LOCK_STEP in controller.identity.capabilities:  # elsewhere the moment is met by chance alone
+        assert frozen_far_away(controller) <= TORN

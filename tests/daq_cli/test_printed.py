@@ -8,8 +8,6 @@ import pytest
 import typer
 
 from daq.contracts.experiment import ExperimentSpec
-from daq.contracts.service.robot import RobotStatus
-from daq.contracts.status import StatusReport, report_of
 from daq.trajectories.presets import PRESETS
 from model.fitting.fitted import FittedParameter
 from tests.daq.servo_bench import PAN_TILT
@@ -49,41 +47,11 @@ def test_every_option_has_a_help_text() -> None:
     assert silent == []
 
 
-def test_a_local_status_has_the_fields_of_a_service(daq: CommandLine, port: str) -> None:
-    said = daq("--port", port, "status", "--json")
-    assert said.code == 0, said.err
-    found = StatusReport.model_validate_json(said.out)
-    assert (found.server, found.queue, found.control) == (None, None, None)
-    assert found.sample is not None
-    assert found.identity is not None
-    assert (found.connection, found.arm, found.sample.joints) == ("connected", "idle", (1, 2, 3, 4, 5, 6))
-    assert "missed_set_points" in found.link.counters
-
-
 def test_a_local_status_with_another_machines_file_shows_no_angles(
     daq: CommandLine, port: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("DAQ_ROBOT__MACHINE", str(PAN_TILT))
     daq("--port", port, "status").complains(4, "has 6 joints, the machine file pan_tilt describes 2")
-
-
-def test_a_services_status_is_reported_completely() -> None:
-    moment = "2026-01-01T00:00:00Z"
-    data = {
-        "robot": "ma2000",
-        "machine": "ma2000",
-        "port": "mock://",
-        "connection": "lost",
-        "arm": "disconnected",
-        "activity": "none",
-        "link": {"state": "none"},
-        "control": {"holder": "nobody"},
-        "utc": moment,
-        "queue": {"paused": True, "reason": "no arm", "since": moment, "queued": 2},
-    }
-    status = RobotStatus.model_validate(data)
-    told = report_of(status, "http://arm:8300").model_dump(mode="json")
-    assert told == {"server": "http://arm:8300", **status.model_dump(mode="json")}
 
 
 def test_reset_presets_and_configuration_are_printed_as_json(daq: CommandLine, port: str) -> None:
@@ -105,11 +73,6 @@ def test_imported_exported_and_plotted_traces_are_printed_as_json(daq: CommandLi
     assert exported == {"trace": made["file"], "file": "again.csv"}
     drawn = json.loads(daq("traces", "plot", made["file"], "-o", "rig.html", "--json").out)
     assert Path(drawn["file"]).is_file()
-
-
-@pytest.mark.parametrize("words", ["run preset nonsense --json", "traces show nothing --json"])
-def test_a_failing_command_prints_no_json(daq: CommandLine, words: str) -> None:
-    daq(*words.split()).complains(2)
 
 
 # ---- tables of 80 columns

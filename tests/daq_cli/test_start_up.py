@@ -5,17 +5,13 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import get_args
 
 import pytest
 
 from daq.contracts.effects import effect_names
 from daq.contracts.experiment import parse_joints
-from daq.plugins import Group
 from daq.trajectories.presets import PRESETS
 from daq_cli.app import completion
-from daq_cli.app.subcommands import subcommands
-from tests.daq_cli.invoke import CommandLine
 
 NOT_FOR_HELP = {"rich", "pydantic", "pydantic_settings", "numpy", "serial", "mcap", "platformdirs", "zstandard", "yaml"}
 
@@ -92,18 +88,6 @@ def test_a_stop_is_sent_or_said_not_to_be_whatever_hides_a_package(tmp_path: Pat
     assert done.stdout.startswith("NOTHING WAS STOPPED: ")
     assert said in done.stdout
     assert len(done.stderr.splitlines()) == 1
-
-
-def test_the_help_lists_every_command_once_below_a_heading_with_its_whole_line(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    said = " ".join(CommandLine(capsys)("--help").out.split())
-    every = subcommands().values()
-    assert {command.group for command in every} == set(get_args(Group))
-    places = [said.index(f"{group}:") for group in get_args(Group)]
-    assert places == sorted(places)
-    for command in every:
-        assert said.count(f"{command.name} {command.line}") == 1, command.name
 
 
 # ---- what the tab key offers, without loading what computes

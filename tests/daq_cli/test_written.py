@@ -32,16 +32,6 @@ def test_the_old_file_stays_when_the_new_one_fails(empty_folder: Path) -> None:
     assert list(empty_folder.iterdir()) == [path]
 
 
-def test_a_symbolic_link_stays_a_link(tmp_path: Path) -> None:
-    real, link = tmp_path / "real.json", tmp_path / "link.json"
-    real.write_text("old")
-    link.symlink_to(real)
-    with replacing(link) as part:
-        part.write_text("new")
-    assert link.is_symlink()
-    assert real.read_text() == "new"
-
-
 def test_output_that_cannot_be_written_is_an_error(tmp_path: Path) -> None:
     with (tmp_path / "out").open("wb") as full:
         ended = subprocess.run(

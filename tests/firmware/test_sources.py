@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from firmware_protocol.bridge.sizes import core_files, sizes
 from firmware_protocol.bridge.stack import RETURN_ADDRESS, deepest, functions
 from tests.firmware.compiled import BUILD, SOURCES, made, need
 
@@ -60,30 +59,6 @@ def test_a_fuzzer_finds_nothing_in_a_few_inputs() -> None:
 
 
 # ---- What is read from the tools of an AVR
-
-MAP = """
- .text.bridge_step
-                0x000001a2       0x6e build/core+bridge.c.o
- .text          0x00000210       0x20 build/core+bridge.c.o
- .progmem.data  0x00000068       0x10 build/core+codes.c.o
- .data          0x00800200        0x4 build/core+bridge.c.o
- .bss.ring      0x00800300      0x400 build/core+ring.c.o
- .bss           0x00800700        0x8 build/mega2560+uart.c.o
- .rodata        0x00800206        0x2 build/mega2560+uart.c.o
- .noinit        0x00800710        0x1 build/mega2560+uart.c.o
- .text.libgcc.mul
-                0x00000400       0x1c /usr/lib/gcc/avr/libgcc.a(_mulsi3.o)
- .comment       0x00000000       0x12 build/core+bridge.c.o
-"""
-"""Lines as GNU ld writes them: a section's name alone on its line where it is long."""
-
-
-def test_flash_holds_code_and_constants_by_file_and_ram_what_changes() -> None:
-    flash, ram = sizes(MAP)
-    assert dict(flash) == {"core": 0x6E + 0x20 + 0x10 + 0x4, "ring": 0, "mega2560": 0x2, "libraries": 0x1C}
-    assert dict(ram) == {"core": 0x4, "ring": 0x400, "mega2560": 0x8 + 0x2 + 0x1, "libraries": 0}
-    assert dict(core_files(MAP)) == {"bridge.c": 0x6E + 0x20 + 0x4, "codes.c": 0x10}
-
 
 LISTING = """
 00000100 <main>:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from daq.contracts.errors import SafetyError
+from daq.contracts.limp import GAINS_UNKNOWN
 from daq.driver import Controller
 from daq.link import RequestRefusedError
 from firmware_protocol import commands as c
@@ -211,7 +212,9 @@ def test_an_arm_without_gains_runs_and_its_record_has_none(tmp_path: Path) -> No
     with rig(tmp_path, f"seed=1&secret_map={SEED}&memory_map={path}") as arm:
         result = arm.run()
         assert result.outcome == "complete"
-        assert arm.trace(result).record.gains is None
+        trace = arm.trace(result)
+        assert trace.record.gains is None
+        assert GAINS_UNKNOWN in [event.message for event in trace.events if event.kind == "note"]
         with pytest.raises(SafetyError, match="has no gains"):
             arm.run(SHORT.model_copy(update={"gains": {1: (3, 0, 0)}}))
 

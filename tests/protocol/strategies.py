@@ -70,7 +70,6 @@ REPLIES: dict[type[Reply], st.SearchStrategy[Reply]] = {
     c.Advanced: st.builds(c.Advanced, u64, u32),
     c.Refused: st.builds(c.Refused, u8, u8),
 }
-requests = st.one_of(*REQUESTS.values())
 replies = st.one_of(*REPLIES.values())
 
 

@@ -48,10 +48,7 @@ MISTAKES = {
     "no address": ("[0xFC72]", "[0x1FC72]", r"gripper.low.0: .* less than or equal to 65535 \(found 130162\)"),
     "missing": ("[registers.gripper]", "[registers.claw]", "register claw is not one that the protocol knows"),
     "unknown key": ("[registers.gripper]", "[registers.gripper]\ncolour = 1", "registers.gripper.colour: Extra inputs"),
-    "text for a number": ("bits = 12", 'bits = "12"', r"registers.position.bits: .* valid integer \(found '12'\)"),
     "number for a truth value": ("signed = false", "signed = 0", r"set_point.signed: .* valid boolean \(found 0\)"),
-    "text for an address": ("[0xFC72]", '["FC72"]', r"gripper.low.0: Input should be a valid integer \(found 'FC72'\)"),
-    "no list": ("low = [0xFC72]", "low = 0xFC72", "registers.gripper.low: "),
     "no such provenance": (
         '"documented", ',
         '"rumoured", ',
@@ -85,11 +82,7 @@ def test_a_mistake_is_told_in_one_line(right: str, wrong: str, says: str) -> Non
     assert "\n" not in str(caught.value)
 
 
-def test_a_register_is_known_and_has_every_joint() -> None:
-    extra = SHIPPED + '\n[registers.lamp]\nunit = "on_off"\nbits = 1\nsigned = false\naccess = "read"\n'
-    extra += 'low = [0xFC7F]\nprovenance = ["assumed"]\n'
-    with pytest.raises(MemoryMapError, match="register lamp is not one that the protocol knows"):
-        parse_memory_map(extra)
+def test_a_register_has_every_joint() -> None:
     short = SHIPPED.replace(", 0xFC45]", "]").replace(
         'low = [0xFC40, 0xFC41, 0xFC42, 0xFC43, 0xFC44]\nprovenance = ["assumed", ',
         "low = [0xFC40, 0xFC41, 0xFC42, 0xFC43, 0xFC44]\nprovenance = [",

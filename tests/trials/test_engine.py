@@ -77,12 +77,6 @@ def test_an_arm_without_drives_and_friction_keeps_its_energy(bodies: Bodies, sta
     assert (potential + kinetic) == pytest.approx(potential[0] + kinetic[0], abs=2e-3 * kinetic.max())
 
 
-def test_a_rod_swings_as_its_formula_says() -> None:
-    motion = free_fall(Bodies((Link.rod(0.3, 0.8),), 0.0, HANGING), [0.02], rotors=0.001)
-    rate = math.sqrt(0.8 * 9.81 * 0.15 / (0.8 * 0.3**2 / 3 + 0.001))
-    assert motion.angle[:, 0] == pytest.approx(0.02 * np.cos(rate * motion.time), abs=2e-5)
-
-
 def test_a_constant_voltage_gives_the_speed_and_time_of_a_motor() -> None:
     """(J) dω/dt = K u/R − K² ω/R, from rest, by a controller that asks for 10 V."""
     motor = joints(1)

@@ -92,14 +92,6 @@ def test_a_wrong_variable_is_named(monkeypatch: pytest.MonkeyPatch, name: str, v
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("content", [b"\xff\xfe", b"[robot"], ids=["no text", "no TOML"])
-def test_a_file_that_cannot_be_read_is_one_line(content: bytes) -> None:
-    Path("daq.toml").write_bytes(content)
-    with pytest.raises(SpecError, match=r"configuration daq\.toml: ") as caught:
-        load_settings()
-    assert "\n" not in str(caught.value)
-
-
 @pytest.mark.parametrize("nearly", ["1", '"yes"', '"on"', "1.0", '"True"', '"true"', '"false"'])
 def test_whether_an_arm_may_move_unattended_is_true_or_false(nearly: str) -> None:
     Path("daq.toml").write_text(f"[server]\nunattended = {nearly}\n", "utf-8")

@@ -155,14 +155,6 @@ def test_on_a_faulty_line_no_period_is_lost_and_none_is_wrong() -> None:
     assert run.counters.missing_samples == gaps
 
 
-def test_a_run_in_lock_step_repeats_to_the_bit() -> None:
-    runs = []
-    for _ in range(2):
-        with Controller.connect("mock://?lock_step=1&seed=6" + FAULTY_LINE) as controller:
-            runs.append(ramp(controller, 300))
-    assert runs[0] == runs[1]
-
-
 def test_every_set_point_that_the_controller_missed_is_found() -> None:
     with Controller.connect("mock://?lock_step=1&seed=8&fault=busy_memory:rate=0.1") as controller:
         run = ramp(controller, 500)

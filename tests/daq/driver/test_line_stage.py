@@ -4,7 +4,6 @@ The stage is that of the example's rig, which shares no code with them; its time
 """
 
 import sys
-from collections.abc import Callable
 from importlib.util import module_from_spec, spec_from_file_location
 from itertools import pairwise
 from pathlib import Path
@@ -20,14 +19,11 @@ from daq.contracts.experiment import ExperimentSpec, Multisine
 from daq.contracts.machine import load_machine
 from daq.driver import Controller
 from daq.link import Link, LinkTimeoutError, RequestRefusedError
-from daq.runner.arm_control import ArmControl
-from daq.runner.experiment import RunSetup, StopRequests, run_experiment
-from daq.runner.preparation import Consent
 from daq.traces.reader import read_trace
 from firmware_protocol.commands import Capability, FineSetPoints, Hello, Sample, StatusFlag, Stop
 from model.machine_model.model import base_model
 from model.simulation.simulate import simulate
-from tests.daq.quiet import Quiet
+from tests.daq.servo_bench import InMemory, run_at
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 COUNT = 50e-6
@@ -46,20 +42,15 @@ def example(name: str) -> ModuleType:
 DIALECT, RIG = example("line_stage_dialect"), example("line_stage_rig")
 
 
-class Line:
-    """Endpoint, channel and clock at once, as `tests.daq.servo_bench`. `hearing` may change or lose what is written."""
-
-    lock_step = False
-    url = description = "a stage in memory"
-    bytes_per_second = 11520.0
-    control = None
+class Line(InMemory):
+    """The stage in memory."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.stage = RIG.Stage()
         self.us = 0
         self.written: list[bytes] = []
-        self.hearing: Callable[[bytes], bytes] = lambda data: data
-        self._coming = self._rest = b""
+        self._rest = b""
 
     def now(self) -> float:
         return self.us * 1e-6
@@ -68,24 +59,10 @@ class Line:
         self.us = max(self.us, round(time_s * 1e6))
         self.stage.advance_to(self.us // 1000)
 
-    def waited(self) -> float:
-        return 0.0
-
-    def connect(self) -> "Line":
-        return self
-
     def write(self, data: bytes) -> None:
         self.written.append(data)
         *lines, self._rest = (self._rest + self.hearing(data)).split(b"\r")
         self._coming += b"".join(self.stage.obey(line) + b"\r" for line in lines)
-
-    def read(self, timeout_s: float) -> bytes:
-        self.sleep_until(self.now() + (300e-6 if self._coming else max(0.0, timeout_s) + 250e-6))
-        data, self._coming = self._coming, b""
-        return data
-
-    def close(self) -> None:
-        """Nothing to give back."""
 
     def controller(self) -> Controller:
         dialect: Any = DIALECT.LineStageDialect((1, 2))
@@ -221,10 +198,7 @@ def test_a_record_of_the_stage_is_what_its_model_does(line: Line, tmp_path: Path
     spec = ExperimentSpec(trajectory=trajectory, joints=(1, 2), settle=0.3, hold=0.3)
     with line.controller() as controller:
         controller.release(controller.status().stop)
-        setup = RunSetup(
-            controller, ArmControl(controller), spec, machine, machine.limits, tmp_path, Quiet(), StopRequests()
-        )
-        result = run_experiment(setup, Consent())
+        result = run_at(controller, spec, machine, tmp_path)
     assert (result.outcome, result.missing) == ("complete", 0)
     trace = read_trace(result.trace)
     simulation = simulate(base_model(machine), trace)

@@ -12,7 +12,6 @@ from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine
 from daq.contracts.service.robot import LinkStatus, RobotIdentity
 from daq.driver import BoardSnapshot, Controller, StopConfirmation
-from daq.driver.line_rate import reported_rates
 from daq.owner.seen import rates_line, with_rates
 from daq.runner.arm_control import ArmControl, StoppedError, stop_line
 from daq.runner.lag import OLDEST_TO_ACT_ON, Lag
@@ -253,10 +252,6 @@ def test_what_is_like_it_is_refused_before_anything_is_asked(word: object) -> No
                 say()
 
 
-def test_only_given_consent_moves_a_real_arm() -> None:
-    assert (Consent(True).moves_real_arm, Consent().moves_real_arm) == (True, False)
-
-
 # ---- What the line to a controller can give, as a status has it, and as people read it
 
 LINK = LinkStatus(state="connected", counters={"requests": 7.0}, age=0.5)
@@ -264,19 +259,6 @@ LINK = LinkStatus(state="connected", counters={"requests": 7.0}, age=0.5)
 
 def identity(**fields: bool) -> RobotIdentity:
     return RobotIdentity.model_validate({"simulated": True, "protocol": 2, "period": 0.02, "boots": 1} | fields)
-
-
-@pytest.mark.parametrize(("baud", "compact"), [(115200, False), (19200, False), (19200, True)])
-def test_a_status_has_the_rates_of_its_line_and_the_longest_time_of_a_stop(baud: int, compact: bool) -> None:
-    found = with_rates(LINK, baud / 10, identity(compact=compact))
-    rates = reported_rates(baud / 10, 0.02, can_be_compact=compact)
-    assert [(rate.joints, rate.every) for rate in found.rates] == [(rate.joints, rate.every) for rate in rates]
-    assert [rate.samples_per_second for rate in found.rates] == [
-        pytest.approx(50.0 / rate.every, abs=5e-4) for rate in rates
-    ]
-    assert [rate.share for rate in found.rates] == [pytest.approx(rate.share, abs=5e-4) for rate in rates]
-    assert found.stop_seconds == pytest.approx(66 / (baud / 10) + 0.010)
-    assert (found.state, found.counters, found.age) == ("connected", {"requests": 7.0}, 0.5), "the rest is as it was"
 
 
 def test_one_line_tells_the_rates_and_the_stop_as_far_as_they_are_known() -> None:

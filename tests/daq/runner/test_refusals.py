@@ -10,14 +10,12 @@ import pytest
 
 from daq.contracts.errors import DaqError, SafetyError, SpecError, TraceError
 from daq.contracts.experiment import ExperimentSpec, Pause, Ramp
-from daq.contracts.limp import GAINS_UNKNOWN
-from daq.contracts.machine import Machine, load_machine
+from daq.contracts.machine import Machine
 from daq.driver import Controller, GainsNotTakenError
-from daq.runner.arm_control import ArmControl, StoppedError
+from daq.runner.arm_control import StoppedError
 from daq.runner.preparation import Consent, MissingConsentError, recorded_joints
 from daq.traces.reader import read_trace
 from firmware_protocol.scale import LineScale
-from tests.daq.driver.test_double_read import GAINS, MOCK, without
 from tests.daq.runner.rig import SHORT, Rig
 
 OTHER_GAINS = SHORT.model_copy(update={"gains": {1: (9, 9, 9)}})
@@ -225,20 +223,3 @@ def test_after_a_stop_the_gains_stay_and_the_trace_says_so(arm: Rig) -> None:
         "joint 1: gains stay at 4/0/0, they were 2/0/0 before the run"
     ]
     assert arm.ask("state")["gains"][0] == [4, 0, 0]
-
-
-# ---- A run of an arm whose memory map leaves out the gains: its record says that no limp joint can be seen
-
-
-def notes_of(folder: Path, *absent: str) -> list[str]:
-    with Controller.connect(MOCK, without(*absent)) as controller:
-        assert controller.link.control is not None
-        arm = Rig(controller, ArmControl(controller), folder, load_machine("ma2000"), controller.link.control)
-        trace = arm.trace(arm.run())
-    assert (trace.record.gains is None) == bool(absent)
-    return [event.message for event in trace.events if event.kind == "note"]
-
-
-def test_a_run_without_known_gains_says_so_in_its_record(tmp_path: Path) -> None:
-    assert GAINS_UNKNOWN in notes_of(tmp_path, *GAINS)
-    assert GAINS_UNKNOWN not in notes_of(tmp_path)

@@ -120,17 +120,6 @@ def test_a_machine_file_that_is_not_the_bench_s_is_refused(at: At, tmp_path: Pat
         at.run()
 
 
-@pytest.mark.parametrize(
-    ("amplitude", "duration", "line"),
-    [(90.0, 3.0, "joint 2: .* allowed are 108.86° to 252.10°"), (60.0, 0.2, "joint 1: 300.0 °/s .* up to 114.6 °/s")],
-)
-def test_range_and_speed_are_checked_before_motion(at: At, amplitude: float, duration: float, line: str) -> None:
-    ramp = Ramp(amplitude={1: math.radians(amplitude), 2: math.radians(amplitude * 2)}, duration=duration)
-    with pytest.raises(SafetyError, match=line):
-        at.run(SPEC.model_copy(update={"trajectory": ramp}))
-    assert all(servo[Table.BUS_WATCHDOG] == 0 for servo in at.bench.bench.servos)
-
-
 def test_a_servo_that_drops_off_in_a_run_ends_it_and_the_other_is_held(at: At) -> None:
     at.at_sample[20] = lambda: at.bench.bench.gone.add(1)
     result = at.run()

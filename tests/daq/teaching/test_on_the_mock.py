@@ -46,17 +46,6 @@ def arm(controller: Controller) -> WatchedArm:
     return WatchedArm(controller, ArmControl(controller))
 
 
-def test_a_jog_drives_the_arm_and_stops_when_the_key_is_let_go(arm: WatchedArm) -> None:
-    first = arm.next_sample()
-
-    def commands(_row: SampleRow) -> JogCommand:
-        return JogCommand({1: 0.2}, min(arm.seen[-1].host_time, first.host_time + 1.0))
-
-    jog(arm, MA2000, MA2000.limits, commands, lambda: len(arm.seen) >= 150, print)
-    assert arm.seen[-1].position[0] - first.position[0] == pytest.approx(0.2 * 1.3, abs=0.03)
-    assert arm.seen[-1].position[0] == pytest.approx(arm.seen[-10].position[0], abs=0.005)
-
-
 def test_a_limp_joint_is_recorded_and_held_again_where_it_is(arm: WatchedArm, controller: Controller) -> None:
     before = controller.gains()
     asked = iter(range(60))

@@ -15,17 +15,6 @@ from daq.traces.metadata import extent_of, joints_of, record_of, signals_of
 from daq.traces.room import require_room
 from tests.daq.traces.samples import record
 
-LARGEST = {
-    "time": 4e9,
-    "host_time": 4e9,
-    "tick": 2.0**53,
-    "position": 1e9,
-    "set_point": 1e9,
-    "error": 2e9,
-    "velocity": 1e6,
-    "drive": 1e9,
-}
-
 
 def test_times_increase_and_one_line_names_the_sample_that_does_not_fit() -> None:
     assert first_short_step(np.array([0.0, 1e-9, 1.0])) is None

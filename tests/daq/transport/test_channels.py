@@ -120,14 +120,22 @@ def test_found_ports_are_named_by_urls_in_order() -> None:
 # ---- Channels over real descriptors: a pseudo-terminal, a TCP connection; taken, absent and vanished ports
 
 
-@pytest.fixture
-def terminal() -> Iterator[tuple[int, str]]:
-    """The controller's end of a pseudo-terminal, and the host's device."""
+@contextmanager
+def _terminal() -> Iterator[tuple[int, str]]:
+    """A pseudo-terminal: the controller's end, and the name of the host's."""
     controller, host = pty.openpty()
     tty.setraw(host)
-    yield controller, os.ttyname(host)
-    os.close(controller)
-    os.close(host)
+    try:
+        yield controller, os.ttyname(host)
+    finally:
+        os.close(controller)
+        os.close(host)
+
+
+@pytest.fixture
+def terminal() -> Iterator[tuple[int, str]]:
+    with _terminal() as made:
+        yield made
 
 
 def test_every_byte_passes_a_pseudo_terminal_unchanged(terminal: tuple[int, str]) -> None:
@@ -241,17 +249,6 @@ def test_delays_that_make_no_sense_are_refused(first: float, longest: float) -> 
 
 
 # ---- A mock's pseudo-terminal that has become another program's is left alone
-
-
-@contextmanager
-def _terminal() -> Iterator[tuple[int, str]]:
-    """A pseudo-terminal: the program's end, and the name of the other."""
-    ours, theirs = os.openpty()
-    try:
-        yield ours, os.ttyname(theirs)
-    finally:
-        os.close(ours)
-        os.close(theirs)
 
 
 HOLDER = """

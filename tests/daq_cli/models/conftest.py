@@ -54,3 +54,13 @@ def swing_csv(
     rows = np.column_stack([time, angle, angle, drive])
     np.savetxt(path, rows, delimiter=",", header="time,set_point_1,position_1,drive_1", comments="", fmt="%.9g")
     return path
+
+
+def write_swing(path: Path, seed: int, limit: float | None = None) -> Path:
+    """A hanging rod of 0.8 kg and 0.3 m that swings; the drive is cut off at a limit (V), the motion is not."""
+
+    def torque(angle: Floats, speed: Floats, acceleration: Floats) -> Floats:
+        inertial = (0.8 * 0.3**2 / 3 + 0.004) * acceleration + 0.8 * 9.81 * 0.15 * np.sin(angle)
+        return inertial + 0.02 * speed + 0.02 * np.sign(speed)
+
+    return swing_csv(path, torque, seed, limit=limit)

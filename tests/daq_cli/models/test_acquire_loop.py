@@ -128,11 +128,20 @@ def test_remaining_robot_time_limits_further_experiments(ramp: Path) -> None:
     assert [left for _, left in answers.given] == pytest.approx([2.5 * duration, 1.5 * duration, 0.5 * duration])
 
 
-def test_a_stopped_run_ends_the_loop_and_is_not_used(ramp: Path) -> None:
+@pytest.mark.parametrize("outcome", ["stopped", "fault", "interrupted"])
+def test_a_run_that_is_not_complete_ends_the_loop_and_is_not_used(ramp: Path, outcome: Outcome) -> None:
     answers = Answers(3.0)
-    ended = loop(Arm(ramp, "stopped"), [read_trace(ramp)], 60.0, answers)
-    assert [run.outcome for run in ended.found.acquired] == ["stopped"]
+    ended = loop(Arm(ramp, outcome), [read_trace(ramp)], 60.0, answers)
+    assert [run.outcome for run in ended.found.acquired] == [outcome]
     assert len(ended.traces) == len(answers.given) == 1
+
+
+@pytest.mark.parametrize(("budget", "runs"), [(1.0, 1), (0.999, 0), (2.0, 2), (1.999, 1)])
+def test_an_experiment_is_run_while_it_fits_into_the_remaining_robot_time(ramp: Path, budget: float, runs: int) -> None:
+    trace = read_trace(ramp)
+    duration = float(trace.time[-1] - trace.time[0])
+    ended = loop(Arm(ramp, *["complete"] * 9), [trace], budget * duration, Answers(duration))
+    assert len(ended.found.acquired) == runs
 
 
 def test_experiments_stay_within_the_limits_of_the_configured_machine(ramp: Path) -> None:

@@ -12,7 +12,7 @@ from model.arrays import Floats
 from model.effects.library import own_effects, remove_own
 from model.machine_model.model_file import load_model
 from tests.daq_cli.invoke import CommandLine
-from tests.daq_cli.models.conftest import ROOT, SINGLE_AXIS, swing_csv, write_csv
+from tests.daq_cli.models.conftest import ROOT, SINGLE_AXIS, swing_csv, write_csv, write_swing
 
 # ---- `daq fit --torques`: what it prints, what its page shows, and what it calls the traces
 
@@ -20,16 +20,6 @@ from tests.daq_cli.models.conftest import ROOT, SINGLE_AXIS, swing_csv, write_cs
 LARGEST = 0.9
 """Of the recorded drive, V, in the records of which it stands at a limit."""
 WORDS = ("--torques", "--machine", SINGLE_AXIS, "--parameters", "link1.mass,joint1.drive.inertia", "-o", "out.json")
-
-
-def write_swing(path: Path, seed: int, limit: float | None = None) -> Path:
-    """A hanging rod of 0.8 kg and 0.3 m that swings; the drive is cut off at a limit (V), the motion is not."""
-
-    def torque(angle: Floats, speed: Floats, acceleration: Floats) -> Floats:
-        inertial = (0.8 * 0.3**2 / 3 + 0.004) * acceleration + 0.8 * 9.81 * 0.15 * np.sin(angle)
-        return inertial + 0.02 * speed + 0.02 * np.sign(speed)
-
-    return swing_csv(path, torque, seed, limit=limit)
 
 
 @pytest.mark.timeout(300)
@@ -296,15 +286,9 @@ def test_an_effect_file_is_used_by_compare_and_validate(daq: CommandLine, dragge
     assert [p["name"] for p in json.loads(daq(*words).out)["fidelity"]["parameters"]] == ["joint1.air_drag.coefficient"]
 
 
-@pytest.mark.parametrize("command", ["simulate", "validate"])
-def test_a_model_that_needs_an_effect_file_names_it(
-    daq: CommandLine, tmp_path: Path, dragged_swing: Path, command: str
-) -> None:
-    model = tmp_path / "drag.json"
-    words = ("--effects", "air_drag", "--effect-file", AIR_DRAG)
-    daq("fit", dragged_swing, "--torques", "--machine", SINGLE_AXIS, "-o", model, *words)
+def test_a_model_that_needs_an_effect_file_names_it(daq: CommandLine, dragged: Path, beginning: Path) -> None:
     forget()
-    daq(command, model, dragged_swing).complains(2, "air_drag.py", "--effect-file")
+    daq("simulate", dragged, beginning).complains(2, "air_drag.py", "--effect-file")
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,10 @@
 """The controller's period, its memory, and what it does when things go wrong."""
 
 import math
-from dataclasses import replace
 
 import pytest
 
 from firmware_protocol.memory_map import default_memory_map
-from firmware_protocol.units import counts_to_posture
 from mock_controller.board import (
     RING_DEPTH,
     Board,
@@ -23,7 +21,6 @@ from mock_controller.quantities import DataFileError
 PERIOD = 20_000
 DELAY = 6_000
 POSITION_LOW = 0xFC20
-POSITION_HIGH = 0xFC28
 
 
 def newest(board: Board) -> PeriodSnapshot:
@@ -115,65 +112,6 @@ def test_host_waits_while_the_controller_fetches(board: Board) -> None:
     assert board.time_us == 10 * PERIOD + 400 + 10
 
 
-def test_low_and_high_byte_read_apart_can_be_torn() -> None:
-    """The arm moves across a multiple of 256 counts; the low byte is read just before the results change, the high
-    byte just after."""
-    board = Board(
-        replace(default_board(), linearity=0.0, noise=0.0), default_memory_map(), Plant(default_plant()), seed=1
-    )
-
-    def torn(posture: int, ticks: range) -> int:
-        """How many readings of both bytes are neither of before nor of after, on the way to a posture."""
-        found = 0
-        board.write_set_points({1: posture})
-        for tick in ticks:
-            before = board.memory.values("position")[0]
-            board.run_until(tick * PERIOD + DELAY - 20)
-            low = board.read(POSITION_LOW, 1)[0]
-            board.run_until(tick * PERIOD + DELAY + 30)
-            high = board.read(POSITION_HIGH, 1)[0]
-            board.run_until(tick * PERIOD + PERIOD // 2)
-            found += (low | high << 8) not in (before, board.memory.values("position")[0])
-        return found
-
-    board.run_until(1)
-    assert torn(540, range(1, 30)) == 0, "no multiple of 256 is crossed on the way from 2048 to 2212"
-    assert torn(580, range(30, 60)) == 1
-
-
-def test_block_read_within_publication_sees_part_old_part_new(board: Board) -> None:
-    board.write_set_points(dict.fromkeys((1, 3), 540))
-    board.run_until(4 * PERIOD + DELAY + 10)
-    old = [value & 0xFF for value in board.memory.values("position")]
-    data = board.read(POSITION_LOW, 16)
-    lows = [value & 0xFF for value in newest_after(board).positions]
-    assert data[0] == lows[0] != old[0], "stored before it was read"
-    assert data[2] == old[2] != lows[2], "read before it was stored"
-    assert [value & 0xFF for value in board.memory.values("position")] == lows
-
-
-def newest_after(board: Board) -> PeriodSnapshot:
-    board.run_until(board.next_event_us)
-    return newest(board)
-
-
-def test_freeze_puts_the_measured_posture_in_the_memory_at_once(board: Board) -> None:
-    board.run_until(PERIOD)
-    board.write_set_points({1: 560, 2: 380, 3: 540})
-    board.run_until(8 * PERIOD + 3000)
-    measured = [counts_to_posture(counts) for counts in board.memory.values("position")]
-    moving = [abs(a - b) for a, b in zip(measured, board.memory.values("set_point"), strict=True)]
-    assert max(moving) > 5
-    began = board.time_us
-    postures = board.freeze()
-    assert board.time_us - began <= 12 * 10
-    assert board.memory.values("set_point") == list(postures)
-    assert max(abs(a - b) for a, b in zip(postures, measured, strict=True)) <= 8  # one period fresher at most
-    board.run_until(10 * PERIOD)
-    assert newest(board).set_points == postures
-    assert newest(board).frozen
-
-
 def test_frozen_set_points_are_held_against_everything_until_released(board: Board) -> None:
     board.run_until(5 * PERIOD + 1000)
     postures = board.freeze()
@@ -220,17 +158,6 @@ def test_brown_out_cuts_the_drive_and_starts_again_where_the_arm_is(board: Board
     assert max(abs(a - b) for a, b in zip(newest(board).set_points, expected, strict=True)) <= 4
     board.run_until(board.time_us + 50 * PERIOD)
     assert max(map(abs, newest(board).errors)) < 10
-
-
-def test_stop_survives_a_brown_out(board: Board) -> None:
-    board.run_until(3 * PERIOD)
-    board.freeze()
-    board.brown_out()
-    board.run_until(20 * PERIOD)
-    held = newest(board).set_points
-    board.write_set_points({1: 700})
-    board.run_until(25 * PERIOD)
-    assert newest(board).set_points == held
 
 
 def test_ring_keeps_the_newest_and_serves_the_oldest_unseen(board: Board) -> None:

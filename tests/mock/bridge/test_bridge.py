@@ -8,10 +8,8 @@ import pytest
 from firmware_protocol import commands as c
 from firmware_protocol.commands import AFTER_NEWEST, Sample, Snapshot, Stop, Stopped
 from firmware_protocol.framing import Frame, encode_frame
-from firmware_protocol.joints import ALL_JOINTS
 from firmware_protocol.message import Request
 from firmware_protocol.session import parse_reply, to_frame
-from firmware_protocol.units import counts_to_posture
 from mock_controller.board.parameters import default_board_text
 from mock_controller.bridge.bridge import WAIT_LIMIT_PERIODS, Bridge
 from mock_controller.pace import LATE_US
@@ -60,29 +58,6 @@ def test_no_session_and_no_stop_has_the_number_0(host: LockStepHost, first_numbe
     assert 0 not in numbers
 
 
-@pytest.mark.parametrize("request_", [c.ReadBlock(0xFBFF, 1), c.ReadBlock(0xFC7F, 2), c.WriteBlock(0xFC7F, b"ab")])
-def test_memory_ends_where_the_map_says(host: LockStepHost, request_: Request) -> None:
-    before = host.board.time_us
-    assert refusal(host.ask(request_)) is c.Refusal.BAD_ADDRESS
-    assert host.board.time_us == before
-
-
-def test_set_points_gains_and_bytes_are_in_the_memory(host: LockStepHost) -> None:
-    assert host.ask(c.SetGains(2, 5, 1, 3)) == c.GainsSet()
-    assert host.ask(c.ReportGains()) == c.Gains(((2, 0, 0), (5, 1, 3), *(((2, 0, 0),) * 4)))
-    assert host.ask(c.WriteBlock(0xFC78, b"\x01\x02\x03")) == c.BlockWritten()
-    assert host.ask(c.ReadBlock(0xFC77, 5)) == c.Block(b"\x00\x01\x02\x03\x00")
-    taken = host.ask(c.WriteSetPoints(((1, 520), (3, 480))))
-    assert isinstance(taken, c.SetPointsTaken)
-    assert host.board.memory.values("set_point")[0:3:2] == [520, 480]
-    snapshot = host.ask(c.Sample(taken.tick, ALL_JOINTS))
-    assert isinstance(snapshot, c.Snapshot)
-    readings = dict(snapshot.joints)
-    assert snapshot.tick == taken.tick + 1
-    assert (readings[1].set_point, readings[3].set_point) == (520, 480)
-    assert readings[2].set_point == host.board.memory.values("set_point")[1]
-
-
 def test_process_outputs_change_only_in_the_mask_and_inputs_are_read(host: LockStepHost) -> None:
     host.board.set_process_inputs(0b1010_0000)
     assert host.ask(c.WriteOutputs(0b0011, 0b0001)) == c.OutputsWritten()
@@ -91,29 +66,6 @@ def test_process_outputs_change_only_in_the_mask_and_inputs_are_read(host: LockS
     host.ask(c.Advance(20_000))
     assert host.ask(c.ReadProcess()) == c.Process(0b1010_0000, 0b0101, 1)
     assert host.board.gripper_closed
-
-
-def test_stop_freezes_the_measured_posture_and_refuses_set_points_until_release(host: LockStepHost) -> None:
-    host.ask(c.WriteSetPoints(((1, 600),)))
-    host.ask(c.Advance(310_000))
-    stopped = host.ask(c.Stop())
-    assert isinstance(stopped, c.Stopped)
-    newest = host.board.snapshots.newest()
-    assert list(stopped.postures) == [counts_to_posture(counts) for counts in newest.positions]
-    assert host.board.memory.values("set_point") == list(stopped.postures)
-    assert refusal(host.ask(c.WriteSetPoints(((1, 600),)))) is c.Refusal.FROZEN
-    assert refusal(host.ask(c.WriteBlock(0xFC00, b"\x00"))) is c.Refusal.FROZEN
-    assert host.ask(c.WriteBlock(0xFC78, b"\x00")) == c.BlockWritten()
-    snapshot = host.ask(c.Sample(stopped.tick, 1))
-    assert isinstance(snapshot, c.Snapshot)
-    assert snapshot.status & c.StatusFlag.FROZEN
-    assert host.ask(c.Stop()) == stopped
-    status = host.ask(c.ReadStatus())
-    assert isinstance(status, c.Status)
-    assert refusal(host.ask(c.Release(status.stop - 1))) is c.Refusal.OTHER_STOP
-    assert host.ask(c.Release(status.stop)) == c.Released()
-    assert host.ask(c.Release(status.stop)) == c.Released()
-    assert isinstance(host.ask(c.WriteSetPoints(((1, 600),))), c.SetPointsTaken)
 
 
 def test_a_sample_that_waits_in_vain_is_refused(tmp_path: Path) -> None:

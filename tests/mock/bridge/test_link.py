@@ -189,18 +189,6 @@ def test_a_sample_waits_for_its_period_while_others_are_answered() -> None:
     assert sorted(number for _, number, _ in answers) == [1, 2]
 
 
-def test_damage_is_counted_and_never_answered() -> None:
-    host = RealTimeHost()
-    frame = bytearray(host.dialect.encode(1, c.Hello(2, 5)))
-    frame[4] ^= 0x10
-    host.pace.receive(bytes(frame))
-    host.pace.receive(b"\0" + b"x" * 500 + b"\0")
-    assert host.wait(30_000) == []
-    assert host.device.link.counts.damaged == 2
-    host.send(2, c.Hello(2, 5))
-    assert [number for _, number, _ in host.wait(100)] == [2]
-
-
 def test_a_host_that_hangs_up_leaves_nothing_behind() -> None:
     host = RealTimeHost(baud=9600)
     host.send(1, c.Hello(2, 5))

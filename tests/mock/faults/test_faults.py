@@ -7,7 +7,7 @@ from statistics import pstdev
 
 import pytest
 
-from firmware_protocol.commands import Advance, Hello, ReadStatus, Sample, Snapshot, Status, StatusFlag
+from firmware_protocol.commands import Advance, ReadStatus, Sample, Snapshot, Status
 from firmware_protocol.commands import WriteSetPoints as Write
 from firmware_protocol.joints import ALL_JOINTS, JointReading
 from mock_controller.faults.fault import FaultError, fields_of
@@ -153,15 +153,6 @@ def test_damage_is_noticed_and_junk_damages_nothing_but_itself() -> None:
     assert sum(delay == 12_000 for _, delay in answers) == struck
 
 
-@pytest.mark.parametrize("direction", ["to_controller", "to_host"])
-def test_dropped_frames_are_gone(direction: str) -> None:
-    host, answers = exchange(f"drop:rate=0.1,direction={direction}")
-    struck = counted(host, "drop")
-    assert set(struck) == {direction}
-    assert len(answers) == 300 - struck[direction]
-    assert host.device.link.counts.damaged == host.dialect.damaged == 0
-
-
 def test_late_and_split_frames_arrive_in_the_end() -> None:
     host, answers = exchange("delay:rate=0.1,direction=to_host,ms=12")
     struck = counted(host, "delay")["to_host"]
@@ -211,24 +202,6 @@ def readings(snapshots: list[Snapshot], joint: int) -> list[JointReading]:
     return [dict(snapshot.joints)[joint] for snapshot in snapshots]
 
 
-def test_set_points_are_missed_while_the_memory_is_busy() -> None:
-    host = LockStepHost(fault=("busy_memory:start=0.12,duration=0.1",))
-    host.ask(Advance(90_000))
-    host.ask(Write(((1, 520),)))
-    sampled(host, 1)
-    host.ask(Write(((1, 540),)))
-    snapshots = sampled(host, 6)
-    assert [bool(s.status & StatusFlag.SET_POINT_MISSED) for s in snapshots] == [True] * 5 + [False]
-    assert [r.set_point for r in readings(snapshots, 1)] == [520] * 5 + [540]
-    assert host.device.faults.counts() == {"busy_memory": {"board": 5}}
-    assert host.board.counters.set_points_missed == 5
-    host = LockStepHost(fault=("busy_memory:rate=0.3,seed=9",))
-    host.ask(Advance(4_000_000))
-    struck = host.device.faults.counts()["busy_memory"]["board"]
-    assert 30 < struck < 90
-    assert host.board.counters.set_points_missed == struck
-
-
 def test_a_stuck_potentiometer_recovers_and_a_noisy_one_scatters() -> None:
     host = LockStepHost()
     host.ask(Advance(100_000))
@@ -243,29 +216,3 @@ def test_a_stuck_potentiometer_recovers_and_a_noisy_one_scatters() -> None:
     assert pstdev(quiet) < 3
     assert pstdev(loud) > 15
     assert host.device.faults.counts()["noisy_potentiometer"]["board"] > 90
-
-
-def test_a_stalled_joint_stays_where_it_is_and_comes_free_again() -> None:
-    host = LockStepHost()
-    host.ask(Advance(100_000))
-    angle = host.board.plant.joint_angles[0]
-    host.device.faults.switch_on("stalled_joint:joint=1")
-    host.ask(Write(((1, 530),)))
-    host.ask(Advance(500_000))
-    assert abs(host.board.plant.joint_angles[0] - angle) < 1e-6
-    assert readings(sampled(host, 1), 1)[0].error > 100
-    host.device.faults.switch_off("stalled_joint")
-    host.ask(Advance(1_000_000))
-    assert host.board.plant.joint_angles[0] > angle + 0.1
-
-
-def test_a_brown_out_restarts_the_board_where_the_arm_is() -> None:
-    host = LockStepHost(fault=("brown_out:start=0.5",))
-    host.ask(Hello(2, 1))
-    host.ask(Write(((1, 540),)))
-    host.ask(Advance(700_000))
-    assert host.board.counters.boots == 2
-    (snapshot,) = sampled(host, 1)
-    assert snapshot.status & StatusFlag.RESTARTED
-    assert 500 < dict(snapshot.joints)[1].set_point < 545
-    assert host.device.faults.counts() == {"brown_out": {"board": 1}}

@@ -12,7 +12,6 @@ import pytest
 from daq.contracts.machine import DcMotor, Machine, load_machine
 from firmware_protocol.commands import Hello
 from firmware_protocol.memory_map import default_memory_map
-from firmware_protocol.units import posture_to_counts
 from mock_controller.board import default_board
 from mock_controller.board.sensor import LinearityCurve
 from mock_controller.control import Control
@@ -157,17 +156,6 @@ def test_every_seed_draws_sensors_near_the_stated_ones_told_in_degrees() -> None
     assert directions == {-1, 1}
     (first, *_) = draw_sensors(3, STATED)
     assert truth_of([first])[0]["range_deg"] == pytest.approx(math.degrees(first.range_rad), abs=1e-3)
-
-
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_an_arm_with_secret_sensors_holds_itself_and_follows_its_set_points(seed: int) -> None:
-    board = make_device(secret_sensors=seed, lock_step=True).board
-    assert board.parameters.calibrations == draw_sensors(seed, STATED)
-    board.run_until(200_000)
-    there = board.memory.values("set_point")
-    board.write_set_points({1: there[0] + 20})
-    board.run_until(2_000_000)
-    assert abs(board.memory.values("position")[0] - posture_to_counts(there[0] + 20)) < 12
 
 
 # ---- A secret is told to nobody

@@ -1,19 +1,31 @@
-"""The library of effects as a whole, and the effects of load, sensors and controller."""
+"""The library of effects as a whole; and, one by one, effects that models do not have, or not in the mock's shape.
+
+All others move the mock as they move the model (`tests/model/trial/test_conventions.py`), or have records of theirs
+among the golden answers (`benchmarks/golden`).
+"""
 
 import dataclasses
+import itertools
 import math
+from dataclasses import replace
 from typing import Any
 
+import mujoco
 import pytest
 
 from daq.contracts.effects import effect_names
 from firmware_protocol.memory_map import default_memory_map
 from mock_controller.board import Board, default_board
 from mock_controller.modification import Modification
-from mock_controller.modifications.parameter import fields_of
+from mock_controller.modifications.parameter import change_joint, fields_of
 from mock_controller.modifications.registry import build_modifications, is_null, known_modifications, table
-from mock_controller.plant import Plant, default_plant
-from tests.mock.modifications.steady import STRETCHED, changed, effect, plant_with, weights, without_friction
+from mock_controller.plant import Plant, PlantParameters, default_plant
+from mock_controller.plant.rigid_body import build_model
+
+UPRIGHT = (math.pi, math.pi / 2, 0.0, 0.0, 0.0, 0.0)
+STRETCHED = (math.pi, 0.0, 0.0, 0.0, 0.0, 0.0)
+STEP_S = 1e-3
+
 
 NO_LIMIT_AT_NULL = ("backlash", "joint_compliance", "amplifier_slew_rate", "stuck_converter_bit")
 """Effects whose equations have no value at null: a spring without give, a rate without limit, a bit that is none."""
@@ -82,67 +94,106 @@ def test_an_effect_of_no_size_changes_no_bit_even_if_it_is_asked(kind: type[Any]
     assert run((kind(**at_null(kind)),)) == untouched
 
 
-# ---- Effects of masses, gravity, springs and disturbances
+# ---- Effects of drives, gears, friction and load
+
+
+def effect(name: str, **values: Any) -> Any:
+    """One effect, told what it wants to know of the arm."""
+    (built,) = build_modifications([(name, values)])
+    if hasattr(built, "know_plant"):
+        built.know_plant(default_plant(), STEP_S)
+    return built
+
+
+def without_friction() -> PlantParameters:
+    """The arm with neither Coulomb friction nor weight."""
+    parameters = default_plant()
+    body = replace(parameters.rigid_body, gravity=(0.0, 0.0, 0.0))
+    for joint in range(1, 7):
+        parameters = change_joint(parameters, joint, constant_friction=0.0)
+    return replace(parameters, rigid_body=body)
+
+
+def plant_with(*modifications: Modification, parameters: PlantParameters | None = None, **more: Any) -> Plant:
+    """An arm with effects, standing upright if nothing else is said."""
+    return Plant(parameters or default_plant(), modifications, **{"angles": UPRIGHT, **more})
+
+
+def weights(parameters: PlantParameters) -> list[float]:
+    """Torques (N·m) of gravity that the joints of the stretched arm have to hold."""
+    model = build_model(parameters, STEP_S)
+    data = mujoco.MjData(model)
+    data.qpos[:] = STRETCHED
+    mujoco.mj_forward(model, data)
+    return [float(value) for value in data.qfrc_bias]
+
+
+def test_a_stalled_motor_warms_to_where_its_loss_leaves_through_its_case() -> None:
+    theta = 20.0
+    warm = effect("resistance_drift", joint=1, thermal_resistance=theta, time_constant=0.5)
+    plant = plant_with(warm, parameters=without_friction())
+    plant.stall(1)
+    plant.advance([0.2, 0, 0, 0, 0, 0], 10_000_000)
+    volts, cold = 0.2 * 28, default_plant().joints[0].resistance
+    # R = R0 (1 + α θ u²/R)
+    expected = 0.5 * (cold + math.sqrt(cold**2 + 4 * cold * 0.0039 * theta * volts**2))
+    assert warm.resistance == pytest.approx(expected, rel=1e-4)
+    torque = 600 * 0.0208 * volts / cold
+    assert warm.torque_change(torque, 0.0, 0.0, 0.0) == pytest.approx(torque * (cold / expected - 1), rel=1e-3)
+    plant.release(1)
+    plant.reset(STRETCHED)
+    assert warm.resistance == cold
+
+
+@pytest.mark.parametrize("rise", [0.5, -0.3])
+def test_a_winding_warmed_from_outside_loses_torque_with_time_and_not_with_current(rise: float) -> None:
+    outside = effect("resistance_rise", joint=1, rise=rise, time_constant=20.0)
+    plant_with(outside, parameters=without_friction())
+    for time in (0.0, 10.0, 60.0):
+        resistance = 1.0 + rise * (1.0 - math.exp(-time / 20.0))
+        assert [outside.torque_change(torque, time, 0.0, 0.0) for torque in (0.0, 1.0, -4.0)] == pytest.approx(
+            [0.0, 1.0 / resistance - 1.0, 4.0 - 4.0 / resistance]
+        )
+
+
+def test_stiction_holds_a_joint_until_the_breakaway_torque_and_lets_it_go_then() -> None:
+    def moved(torque: float, *modifications: Any) -> float:
+        """How far the waist has come while its motor's torque rose slowly to so many N·m."""
+        plant = plant_with(*modifications, parameters=without_friction())
+        full = torque / (28 * 600 * 0.0208 / 5.49)
+        for step in range(1, 51):
+            plant.advance([full * step / 50, 0, 0, 0, 0, 0], 10_000)
+        return plant.joint_angles[0] - math.pi
+
+    def bond() -> Any:
+        return effect("stiction", joint=1, breakaway=4.0, speed=0.02)
+
+    assert abs(moved(3.0, bond())) < 2e-3
+    assert moved(3.0) > 1e-2
+    assert 0.3 * moved(12.0) < moved(12.0, bond()) < 0.95 * moved(12.0)
+
+
+def test_cogging_has_steeper_flanks_than_a_ripple_of_its_size_and_number() -> None:
+    steepest = []
+    for name in ("torque_ripple", "detent_cogging"):
+        torque = effect(name, joint=3, amplitude=2.0, periods=12.0)
+        values = [torque.joint_torque(0.0, 2 * math.pi * k / 1200, 0.0) for k in range(1200)]
+        assert max(values) == pytest.approx(2.0, rel=0.35)
+        steepest.append(max(b - a for a, b in itertools.pairwise(values)))
+    assert steepest[1] > 2 * steepest[0]
+
 
 G = 9.81
 BODY = default_plant().rigid_body
 
 
-def more_weight(name: str, angles: tuple[float, ...] = STRETCHED, **values: float) -> list[float]:
-    before = weights(default_plant(), angles)
-    return [a - b for a, b in zip(weights(changed(name, **values), angles), before, strict=True)][:3]
-
-
-def test_masses_weigh_where_they_are_and_a_tilted_base_turns_gravity() -> None:
-    assert more_weight("payload", mass=0.5) == pytest.approx([0.0, 0.5 * G * (BODY.a2 + BODY.a3), 0.5 * G * BODY.a3])
-    beyond = more_weight("payload", mass=0.5, offset=0.1)
-    assert beyond[2] == pytest.approx(0.5 * G * (BODY.a3 + 0.1))
-    assert more_weight("link_mass", joint=2, mass=0.4) == pytest.approx([0.0, 0.4 * G * BODY.a2 / 2, 0.0])
-    both = [0.0, 0.4 * G * (BODY.a2 + BODY.a3 / 2), 0.4 * G * BODY.a3 / 2]
-    assert more_weight("link_mass", joint=3, mass=0.4) == pytest.approx(both)
-    assert more_weight("centre_of_mass", joint=2, shift=0.05) == pytest.approx([0.0, BODY.m2 * G * 0.05, 0.0])
-    third = BODY.m3 * G * -0.05
-    assert more_weight("centre_of_mass", joint=3, shift=-0.05) == pytest.approx([0.0, third, third])
-    tilted = changed("base_tilt", about_x=0.03, about_y=0.1)
-    assert math.hypot(*tilted.rigid_body.gravity) == pytest.approx(G)
-    # Upright, the arm (its load above the base) falls along the way gravity now leans.
-    upright = (math.pi, math.pi / 2, 0.0, 0.0, 0.0, 0.0)
-    x, y, _ = changed("base_tilt", about_y=0.1).rigid_body.gravity
-    assert (x, y) == pytest.approx((-G * math.sin(0.1), 0.0))
-    lean = weights(changed("base_tilt", about_y=0.1), upright)[1] - weights(default_plant(), upright)[1]
-    assert abs(lean) == pytest.approx(weights(default_plant())[1] * math.sin(0.1), rel=1e-6)
-
-
-def test_a_spring_pulls_towards_its_neutral_angle() -> None:
-    spring = effect("spring_torque", joint=2, stiffness=5.0, neutral=0.4)
-    assert spring.joint_torque(0.0, 0.6, 0.0) == pytest.approx(-1.0)
-    assert spring.joint_torque(0.0, 0.0, 9.0) == pytest.approx(2.0)
-    plant = plant_with(
-        effect("spring_torque", joint=1, stiffness=60.0, neutral=math.pi + 0.2), parameters=without_friction()
-    )
-    plant.advance([0.0] * 6, 200_000)
-    assert math.pi + 0.005 < plant.joint_angles[0] < math.pi + 0.2
-    assert plant.joint_angles[2] == pytest.approx(0.0, abs=1e-6)
-
-
-@pytest.mark.parametrize("stiffness", [5.0, -5.0])
-def test_a_cable_pulls_on_one_side_of_where_it_is_slack(stiffness: float) -> None:
-    cable = effect("one_sided_spring", joint=2, stiffness=stiffness, slack=0.4)
-    side = math.copysign(1.0, stiffness)
-    assert cable.joint_torque(0.0, 0.4 + side * 0.2, 9.0) == pytest.approx(-side)
-    assert cable.joint_torque(0.0, 0.4 - side * 0.2, 9.0) == 0.0
-
-
-def test_a_preload_turns_a_free_joint_and_a_disturbance_keeps_its_frequency() -> None:
-    plant = plant_with(effect("constant_torque", joint=1, torque=4.0), parameters=without_friction())
-    begun = plant.joint_angles[0]
-    plant.advance([0.0] * 6, 100_000)
-    assert plant.joint_angles[0] > begun
-    assert effect("constant_torque", joint=1, torque=4.0).joint_torque(9.0, 1.0, -2.0) == 4.0
-    push = effect("periodic_disturbance", joint=1, amplitude=3.0, frequency=2.0, phase=0.0)
-    assert push.joint_torque(0.125, 1.0, 2.0) == pytest.approx(3.0)
-    assert push.joint_torque(0.375, -1.0, 0.0) == pytest.approx(-3.0)
-    assert push.joint_torque(0.5, 0.0, 0.0) == pytest.approx(0.0, abs=1e-9)
+def test_a_payload_weighs_at_the_hand_or_beyond_it() -> None:
+    before = weights(default_plant())
+    for beyond in (0.0, 0.1):
+        own = weights(effect("payload", mass=0.5, offset=beyond).change_plant(default_plant()))
+        reach = BODY.a3 + beyond
+        expected = [0.0, 0.5 * G * (BODY.a2 + reach), 0.5 * G * reach]
+        assert [a - b for a, b in zip(own, before, strict=True)][:3] == pytest.approx(expected)
 
 
 # ---- Effects of potentiometers, converter and controller
@@ -160,24 +211,6 @@ def sensor(name: str, **values: Any) -> Any:
 def board_with(*requests: tuple[str, dict[str, Any]], seed: int = 1) -> Board:
     modifications = build_modifications(requests)
     return Board(default_board(), default_memory_map(), Plant(default_plant(), modifications), seed, modifications)
-
-
-def test_potentiometers_that_are_off_move_the_reading_and_not_the_arm() -> None:
-    gain = sensor("potentiometer_gain", joint=1, error=0.05)
-    assert gain.sensed_angle(math.pi) == pytest.approx(math.pi)
-    assert gain.sensed_angle(math.pi + 1.0) == pytest.approx(math.pi + 1.05)
-    assert gain.sensed_angle(math.pi - 1.0) == pytest.approx(math.pi - 1.05)
-    assert sensor("potentiometer_offset", joint=2, angle=-0.1).sensed_angle(0.7) == pytest.approx(0.6)
-    plain, shifted = board_with(), board_with(("potentiometer_offset", {"joint": 2, "angle": 0.1}))
-    assert shifted.plant.joint_angles == plain.plant.joint_angles
-    moved = [b - a for a, b in zip(plain.memory.values("position"), shifted.memory.values("position"), strict=True)]
-    assert moved[1] == pytest.approx(0.1 * 4096 / RANGE, abs=3)
-    assert moved[:1] + moved[2:] == [0] * 5
-    drifting = sensor("potentiometer_zero_drift", joint=1, drift=0.02, time_constant=2.0)
-    shown = [drifting.sensed_angle(1.0) for _ in range(1001)]
-    assert shown[0] == 1.0
-    assert shown[100] == pytest.approx(1.0 + 0.02 * (1 - math.exp(-1.0)), rel=1e-6)
-    assert shown[-1] == pytest.approx(1.02, abs=1e-5)
 
 
 @pytest.mark.parametrize("sign", [1, -1])

@@ -92,10 +92,3 @@ class SerialHost:
             for sequence, reply in self.dialect.feed(data):
                 if sequence == self.sequence:
                     return reply
-
-    def turn(self, sequence: int, request: Request) -> bytes:
-        """Everything the mock says in one turn of lock-step."""
-        self.port.write(self.dialect.encode(sequence, request))
-        said: bytes = self.port.read_until(b"\0\0\0\0")
-        self.dialect.feed(said)  # for the session
-        return said

@@ -9,43 +9,9 @@ import pytest
 import serial
 
 from firmware_protocol import commands as c
-from firmware_protocol.message import Request
 from tests.mock.process.running import RunningMock, SerialHost
 
 WHERE = pytest.mark.parametrize("where", [("--pty",), ("--tcp", "127.0.0.1:0")], ids=["pty", "tcp"])
-
-
-@WHERE
-def test_requests_are_answered_in_real_time(where: tuple[str, ...]) -> None:
-    with RunningMock(*where) as mock, SerialHost(mock.url) as host:
-        assert isinstance(host.ask(c.Hello(2, 1)), c.HelloReply)
-        first = host.ask(c.Sample(c.AFTER_NEWEST, 7))
-        assert isinstance(first, c.Snapshot)
-        assert isinstance(host.ask(c.WriteSetPoints(((1, 510),))), c.SetPointsTaken)
-        second = host.ask(c.Sample(first.tick, 7))
-        assert isinstance(second, c.Snapshot)
-        assert second.tick == first.tick + 1
-        assert isinstance(host.ask(c.Stop()), c.Stopped)
-        assert host.ask(c.WriteSetPoints(((1, 510),))) == c.Refused(c.WriteSetPoints.OPCODE, c.Refusal.FROZEN)
-        state = mock.control("state")
-        assert state["frozen"] is True
-        assert state["stop"]["frozen_us"] - state["stop"]["received_us"] < 1_000
-        assert state["clock"]["mode"] == "real_time"
-        assert mock.control("counts")["bridge"]["frames_received"] == 6
-
-
-@WHERE
-def test_lock_step_repeats_to_the_bit_from_one_process_to_the_next(where: tuple[str, ...]) -> None:
-    faults = ("--fault", "flip:rate=0.1,seed=1", "--fault", "drop:rate=0.05", "--fault", "junk:rate=0.1")
-
-    def everything_said() -> list[bytes]:
-        requests: list[Request] = [c.Hello(2, 1)]
-        for posture in range(500, 540):
-            requests += [c.WriteSetPoints(((1, posture), (2, 333))), c.Sample(c.AFTER_NEWEST, 63)]
-        with RunningMock(*where, "--lock-step", "--seed", "7", *faults) as mock, SerialHost(mock.url) as host:
-            return [host.turn(number, request) for number, request in enumerate(requests)]
-
-    assert everything_said() == everything_said()
 
 
 @WHERE

@@ -22,10 +22,9 @@ from model.discrepancy.diagnosis import Diagnosis
 from model.machine_model.model import base_model
 from tests.daq.executors.by_hand import WorkersByHand, WorkersInThreads
 from tests.daq_cli.invoke import CommandLine
-from trials.blind import sealed
 from trials.blind.campaign import Campaign
 from trials.blind.folder import TrialFolder
-from trials.blind.recording import Recorded, machine_with_load, trial_experiment, write_set_points
+from trials.blind.recording import Recorded, machine_with_load
 from trials.blind.registered import REGISTERED, library_versions, source_tree, to_register, tree_hashes
 from trials.blind.registration import compose
 from trials.blind.sealed import TrialStageError, diagnose_sealed
@@ -100,15 +99,6 @@ def test_the_diagnosis_is_given_traces_and_the_model_and_nothing_else(done: Camp
         assert str(seed // 100) not in everything
 
 
-def test_a_sealed_diagnosis_has_one_thread_for_products_unless_it_is_told_otherwise(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
-    assert sealed._environment()["OPENBLAS_NUM_THREADS"] == "1"
-    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "4")
-    assert sealed._environment()["OPENBLAS_NUM_THREADS"] == "4"
-
-
 def test_the_diagnosis_is_given_the_announced_load(done: Campaign) -> None:
     assert given(done, SECRETS[0])["load"] == 2.0
     assert given(done, SECRETS[1])["load"] == pytest.approx(1.250307)
@@ -145,13 +135,6 @@ def resumed(path: Path, done: Campaign) -> Campaign:
     for file in (done.folder.path / "traces").iterdir():
         (path / "traces" / file.name).write_bytes(file.read_bytes())
     return copy
-
-
-def test_a_resumed_trial_repeats_no_stage(done: Campaign) -> None:
-    before = {stage: (done.folder.path / f"{stage}.jsonl").read_bytes() for stage in STAGES}
-    again = trial(done.folder.path)
-    again.run(SECRETS, WorkersByHand(), lambda _number, _said: None)
-    assert {stage: (done.folder.path / f"{stage}.jsonl").read_bytes() for stage in STAGES} == before
 
 
 def test_nothing_is_begun_once_the_time_is_over(tmp_path: Path) -> None:
@@ -228,26 +211,6 @@ def test_a_diagnosis_that_gives_no_answer_says_why(tmp_path: Path, done: Campaig
     assert row["failure"] == "the diagnosis ended with code 1: it said nothing"
     silent.folder.add("diagnose", row)
     assert silent._score(SECRETS[0])["place"] == "failed"
-
-
-def test_set_points_of_the_detection_are_those_that_a_run_sends(tmp_path: Path) -> None:
-    table = write_set_points(trial_experiment("ramp"), MACHINE, tmp_path / "ramp.csv").read_text("utf-8").splitlines()
-    assert table[0] == "set_point_1,set_point_2,set_point_3,set_point_4,set_point_5,set_point_6"
-    assert len(table) - 1 == pytest.approx(8 * 50, abs=3)
-
-
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (("--seeds", "9:1"), "write FIRST:LAST"),
-        (("--seeds", "1:2", "--kinds", "dirty"), "kind 'dirty': allowed are clean"),
-        (("--seeds", "1:2", "--loads", "none"), "load 'none': allowed are nominal"),
-        ((), "--seeds or --registration"),
-        (("--registration", "nowhere.toml"), "nowhere.toml: cannot be read"),
-    ],
-)
-def test_wrong_options_are_refused_in_one_line(daq: CommandLine, words: tuple[str, ...], says: str) -> None:
-    daq("blind", "--folder", "trial", *words).complains(2, says)
 
 
 def test_hashes_prints_the_tables_of_a_registration(daq: CommandLine) -> None:
