@@ -78,8 +78,8 @@ def diagnose(fitted: Sequence[Path], held_out: Sequence[Path], model: Path, plac
         _, status, usage = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
         seconds = usage.ru_utime + usage.ru_stime
-    if process.returncode == 0:
-        return Run(json.loads((place / "answer").read_bytes()), "", seconds)
+    if (answered := (place / "answer").read_bytes()).strip():  # doubts about the records end with another code
+        return Run(json.loads(answered), "", seconds)
     said = (place / "errors").read_text("utf-8", errors="replace").strip().splitlines()
     late = process.returncode in (-signal.SIGXCPU, -signal.SIGKILL) and seconds > 0.9 * longest
     return Run(None, f"no answer in {longest:.0f} CPU s" if late else f"error: {(said or ['?'])[-1]}", seconds)
@@ -107,7 +107,6 @@ def rows(rig: Rig, alteration: Alteration | None, data: Path, longest: float, ke
             cutoff = min(CUTOFF, _note(run.answer, "cutoff").get("cutoff") or CUTOFF)
             linear = reference(model, records[:first], records[first:], cutoff, offset=rig.offset).held_out
     if keep is not None and run.answer is not None:
-        keep.mkdir(parents=True, exist_ok=True)
         (keep / f"{rig.name}{'-altered' if alteration else ''}.json").write_text(json.dumps(run.answer), "utf-8")
     return [_row(title, question, run, right, linear) for question in questions]
 
@@ -202,6 +201,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(least_squares(rig, options.data), flush=True)
         return 0
     found = list[Row]()
+    if options.keep is not None:
+        options.keep.mkdir(parents=True, exist_ok=True)
     for rig in chosen:
         for alteration in (None,) if options.as_they_are else (None, rig.alteration):
             try:

@@ -11,7 +11,7 @@ Answer = Mapping[str, Any]
 
 SAID = {"nothing-significant": "nothing", "unknown-effect": "unknown", "suspected": "suspected"}
 """Words for answers that name nothing. Any other verdict without a name is shown unchanged."""
-HONEST = ("unknown", "suspected", "partly", "check the record")
+HONEST = ("unknown", "suspected", "partly", "check-the-record")
 """Answers that name nothing and state that something is missing, or wrong with the record."""
 WITHDRAWN = ("found-one-way", "leaves-more-than-noise", "contradicts-file", "worse-than-given")
 """Verdicts that withdraw the result of the search."""
