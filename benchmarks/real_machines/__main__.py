@@ -175,9 +175,7 @@ def summary(found: Sequence[Row]) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Prints the table; returns 1 if a question is not answered correctly or least squares leaves less, 2 without
-    data.
-    """
+    """Prints the table; returns 1 if an answer is not right or least squares leaves less, 2 without data."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path)
     parser.add_argument("--rigs", type=Path, default=HERE / "rigs.toml", help="another list of rigs")
