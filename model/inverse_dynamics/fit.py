@@ -28,7 +28,7 @@ from model.fitting.whitening import fitted_whitener, white
 from model.inverse_dynamics.drive_limits import find_drives_at_limit
 from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motion, recorded_motions
 from model.inverse_dynamics.recorded_sizes import recorded_sizes, with_recorded_sizes
-from model.inverse_dynamics.repeats import noise_left
+from model.inverse_dynamics.repeats import noise_of_torques
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
 from model.machine_model.model import Lineage, Model
 from model.machine_model.posterior import summarise_posterior
@@ -264,7 +264,7 @@ def _verdict(model: Model, traces: Sequence[Trace], motions: Sequence[RecordedMo
     balance = TorqueBalance(model, tuple(motions))
     residual = np.concatenate(balance.residual({}))
     torque = _rms(np.concatenate(balance.supplied_by_drive()))
-    noise = noise_left(model, traces, balance, cutoff)
+    noise = noise_of_torques(model, traces, balance, cutoff).of(balance.residual({}))
     joints = model.machine.modelled_joints
     left = [
         JointLeft(

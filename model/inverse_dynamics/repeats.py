@@ -9,8 +9,11 @@ difference of nearest neighbours, as in the gamma test of Stefánsson, Končar a
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from daq.contracts.trace import Trace
@@ -34,41 +37,58 @@ FEWEST = 100
 """Number of samples that must recur for an estimate."""
 
 
-def noise_left(model: Model, traces: Sequence[Trace], balance: TorqueBalance, cutoff: float) -> Floats:
-    """Returns the root mean square (n,), N·m or N, of a right model's residual torque below a cutoff (Hz).
+@dataclass(frozen=True, eq=False)
+class TorqueNoise:
+    """Noise of residual torques below a cutoff.
 
-    It includes noise of the readings in accelerations, differences between repeated motions, and rounding of the
-    record.
-
-    Args:
-        traces: those of the balance's records.
+    least: (n,) N·m or N, of a right model's, from noise of the readings in accelerations and rounding of the record.
+    records: where motion may recur. round_: (n,) joints for which a whole turn is the same place.
     """
+
+    least: Floats
+    records: tuple[RecordedMotion, ...]
+    round_: Mask
+
+    def of(self, residual: Sequence[Floats]) -> Floats:
+        """Returns the root mean square (n,) of noise in a residual (m, n) per record: what differs between passages of
+        the same motion, `least` at least.
+
+        It is an upper bound, because passages are never quite alike.
+        """
+        return np.maximum(self.least, [_of_passages(residual, j, own) for j, own in enumerate(self._passages)])
+
+    @cached_property
+    def _passages(self) -> list[_Passages | None]:
+        return [_find_passages(self.records, joint, self.round_) for joint in range(len(self.least))]
+
+
+def noise_of_torques(model: Model, traces: Sequence[Trace], balance: TorqueBalance, cutoff: float) -> TorqueNoise:
+    """Returns the noise of a balance's residuals below a cutoff (Hz). traces: those of its records."""
     torques = np.concatenate(balance.supplied_by_drive())
     digits = LEAST_OF_TORQUE * np.sqrt(np.mean(torques**2, axis=0))
-    repeated = repeated_noise(balance.records, balance.residual({}), turns_round(balance.records, model.machine))
-    return np.asarray(np.maximum(np.maximum(torque_noise(model, traces, cutoff), repeated), digits))
+    least = np.maximum(torque_noise(model, traces, cutoff), digits)
+    return TorqueNoise(least, balance.records, turns_round(balance.records, model.machine))
 
 
-def repeated_noise(records: Sequence[RecordedMotion], residual: Sequence[Floats], round_: Mask) -> Floats:
-    """Returns the standard deviation (n,), N·m or N, of differences between passages of the same motion.
-
-    It is 0 for a joint whose motion does not recur, and an upper bound, because passages are never quite alike.
-
-    Args:
-        residual: (m, n) per record, at its compared samples.
-        round_: (n,) joints for which a whole turn is the same place.
-    """
-    joints = records[0].moving.shape[1]
-    return np.array([_of_joint(records, residual, j, round_) for j in range(joints)])
+_Passages = tuple[list[Mask], NDArray[np.intp], NDArray[np.intp]]
+"""Samples at which a joint moves, by record; of these, samples, and for each one of another passage."""
 
 
-def _of_joint(records: Sequence[RecordedMotion], residual: Sequence[Floats], joint: int, round_: Mask) -> float:
+def _of_passages(residual: Sequence[Floats], joint: int, passages: _Passages | None) -> float:
+    if passages is None:
+        return 0.0
+    moving, some, others = passages
+    torque = np.concatenate([x[m, joint] for x, m in zip(residual, moving, strict=True)])
+    return float(np.sqrt(0.5 * np.mean((torque[others] - torque[some]) ** 2)))
+
+
+def _find_passages(records: Sequence[RecordedMotion], joint: int, round_: Mask) -> _Passages | None:
+    """Returns pairs of samples of the same motion; None for a joint whose motion does not recur."""
     moving = [r.moving[:, joint] for r in records]
     state = np.concatenate([_state(r, round_)[m] for r, m in zip(records, moving, strict=True)])
-    torque = np.concatenate([x[m, joint] for x, m in zip(residual, moving, strict=True)])
     when = np.concatenate([1e6 * i + r.time[r.rows][m] for i, (r, m) in enumerate(zip(records, moving, strict=True))])
     if len(state) < FEWEST:
-        return 0.0
+        return None
     state = state / np.maximum(state.std(axis=0), 1e-12) / np.sqrt(state.shape[1])
     near = cKDTree(state).query(state, k=min(NEIGHBOURS, len(state)), distance_upper_bound=ALIKE)
     distance, other = (np.asarray(one) for one in near)
@@ -76,9 +96,8 @@ def _of_joint(records: Sequence[RecordedMotion], residual: Sequence[Floats], joi
     apart[apart] = np.abs(when[other[apart]] - np.repeat(when, apart.sum(axis=1))) > APART
     found = apart.any(axis=1)
     if found.sum() < FEWEST:
-        return 0.0
-    nearest = other[found, apart[found].argmax(axis=1)]
-    return float(np.sqrt(0.5 * np.mean((torque[nearest] - torque[found]) ** 2)))
+        return None
+    return moving, np.flatnonzero(found), other[found, apart[found].argmax(axis=1)]
 
 
 def _state(record: RecordedMotion, round_: Mask) -> Floats:

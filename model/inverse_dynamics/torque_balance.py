@@ -15,6 +15,7 @@ from scipy.signal import lfilter
 from model import layout as at
 from model.arrays import Floats
 from model.drives.piecewise import EDGE
+from model.fitting.phases import turned_pairs
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics import supplied_torque as kernel
 from model.inverse_dynamics.drive_timing import samples_late
@@ -93,7 +94,7 @@ class TorqueBalance:
         drive would reduce the residual by itself. For the same reason the residual is a torque of the drive as the
         machine file states it, whatever the fitted resistance, its warming, magnet and gear ratio.
 
-        values: of the model's parameters, and of `drive_timing.timing_unknowns`, by name.
+        values: of the model's parameters, and of `timing_unknowns` and `phase_unknowns`, by name.
         """
         return self._residual(values, None)
 
@@ -126,7 +127,8 @@ class TorqueBalance:
                 levels[i],
                 gravity[i],
             )
-            torque, rise = self._missing(driven, motion.acceleration, needed[i], joints)
+            own = self._of_record(i, values, joints)
+            torque, rise = self._missing(driven, motion.acceleration, needed[i], own)
             told = (1.0 + rise) * self._told_per_torque(joints)
             friction = friction_at_rest(levels[i], motion, joints)
             result.append(self._compared(i, torque, told, friction, None if near is None else near[i]))
@@ -233,6 +235,16 @@ class TorqueBalance:
             if name in self.model.by_name:  # the other names belong to the records
                 vector[list(self.model.parameter(name).slots)] = value
         return vector
+
+    def _of_record(self, index: int, values: Mapping[str, float], joints: Floats) -> Floats:
+        """Returns the joints' numbers with the phases that disturbances have in a record."""
+        if not (turned := turned_pairs(self.model, values, index)):
+            return joints
+        own = joints.copy()
+        for parameter, value in turned:
+            for slot in parameter.slots:
+                own.ravel()[slot - at.SHARED] = value
+        return own
 
     def _cached(self, what: str, key: bytes, compute: Callable[[int], Any]) -> list[Any]:
         """Returns one result per record, computed again only if `key` has changed since the last call."""

@@ -162,8 +162,8 @@ def false_readings(trace: Trace, machine: Machine, joint: int) -> FalseReadings:
     """Returns the jumps in the readings of a joint's sensor."""
     by_speed, reading = measures_speed(machine, joint), reading_of(trace, machine, joint)
     jumps = find_jumps(trace.time, reading, 0.0 if by_speed else _step(machine, joint))
-    if by_speed:  # a tachometer's reading stops changing as soon as its drive does
-        return sort_jumps(reading, jumps, ())
+    if by_speed:  # between two samples a speed may reach another, or leave a constant one: only a spike is false
+        return replace(sort_jumps(reading, jumps, ()), stuck=(), others=())
     found = sort_jumps(reading, jumps, turns_of(machine, joint))
     told = {jump.row for _, jump in found.stuck} | {last for _, last in cut_off(trace, machine, joint)}
     dead = [one for one in find_dead(reading, _step(machine, joint)) if one[1].row not in told]

@@ -188,7 +188,10 @@ def _open(key: str, text: str, table: Table) -> Said:
 
 
 def _is_there(table: Table, name: str) -> bool:
-    return bool(tokens_in(name, table.columns)) if "{}" in name else name in table.columns
+    if "{}" not in name:
+        return name in table.columns
+    tokens = tokens_in(name, table.columns)  # brackets may hold a joint's name; elsewhere joints have numbers
+    return any("[{" in name or token.isdecimal() for token in tokens)
 
 
 def _guess(table: Table, signal: str) -> str | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,12 @@ FILE_IS_RIGHT = 2 * float(np.log(100.0))
 """Handicap of a number of the machine file against effects of the library, as evidence. That a file states a number
 with a deviation and is wrong by many of them is assumed to be a hundred times rarer than an effect that it leaves out:
 on one axis a winding of twice the stated resistance does nearly what a payload does."""
+
+
+def numbers_of(now: Fit, parameters: Sequence[Parameter]) -> int:
+    """How many numbers an effect with these parameters has in a fit, those of single records included."""
+    own = {(p.effect, p.joints) for p in parameters}
+    return len(parameters) + sum(u.trace is not None and (u.parameter.effect, u.joints) in own for u in now.unknowns)
 
 
 @dataclass(frozen=True)
@@ -44,6 +51,11 @@ class Fitted:
     """The same, counted as for all other candidates (`holdout.Told`)."""
     ended: bool = False
     """Whether its fit has derivatives of its own to its end."""
+
+    @property
+    def size(self) -> int:
+        """Numbers that it adds, those of single records included."""
+        return numbers_of(self.fit, self.parameters)
 
     @property
     def log_odds(self) -> float:

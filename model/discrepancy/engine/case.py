@@ -111,6 +111,10 @@ class Case(ABC):
     def shapes(self, now: Fit) -> tuple[RemainingShape, ...]:
         """What is left, as a torque that a person could write an effect after."""
 
+    def noise_beside(self, now: Fit) -> Floats:  # noqa: ARG002 (the same, if not said)
+        """(n,) standard deviation of a residual of the fitted records of which only noise is left, beside a model."""
+        return self.noise
+
     @abstractmethod
     def joints_left(self, now: Fit, first: Fit, *, named: bool) -> tuple[int, ...]:
         """Joints on which more is left than noise, and is no noise."""

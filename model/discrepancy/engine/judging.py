@@ -56,7 +56,8 @@ def compare(standing: Standing, chosen: Fitted) -> Comparison | None:
     """The candidate beside its reference; None where there was no more than noise to explain."""
     case, reference = standing.case, _reference(standing, chosen.fit.values, chosen.stated)
     before, after = (holdout.squares_unseen(case, f) for f in (reference, chosen.fit))
-    seen = [(reference.squares, chosen.fit.squares, case.noise)]
+    noise = case.noise_beside(chosen.fit)
+    seen = [(reference.squares, chosen.fit.squares, noise)]
     if case.held_out is not None:
         seen.append((before, after, case.noise_held))
     if not any(_is_beyond_noise(standing, chosen, *one) for one in seen):

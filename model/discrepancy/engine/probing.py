@@ -39,7 +39,7 @@ class Trial:
     stated: those of its parameters that the file states, as it states them: the trial lifts their priors. Its starts
     are then measured from where the tolerances' fit has them, `origin`, and not from nothing.
     places: how many of its kind the start was chosen from, as the rates of a tone. law: the effect of the model, where
-    the name stands for two; empty where it is the same.
+    the name stands for two; empty where it is the same. phases: numbers that it adds to single records.
     """
 
     effect: str
@@ -54,11 +54,12 @@ class Trial:
     linear: bool = True
     places: int = 1
     law: str = ""
+    phases: int = 0
 
     @property
     def size(self) -> int:
-        """Parameters that the effect adds."""
-        return len(self.parameters)
+        """Numbers that the effect adds."""
+        return len(self.parameters) + self.phases
 
     def among(self, places: int) -> Trial:
         """The same, chosen from so many."""

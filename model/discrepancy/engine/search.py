@@ -254,7 +254,7 @@ class _Search:
         (before, *after), memory = now.compared.descriptions([now.row, *(f.fit.row for f in found)])
         weighed = []
         for f, described in zip(found, after, strict=True):
-            cost = cost_of(now, memory, len(f.parameters), f.places)
+            cost = cost_of(now, memory, f.size, f.places)
             fell = float((before - described).sum()) + now.prior - f.fit.prior
             weighed.append(replace(f, evidence=fell - cost, cost=cost, relieved=max(now.prior - f.fit.prior, 0.0)))
         return sorted(weighed, key=order_by_odds)

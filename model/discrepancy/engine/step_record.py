@@ -144,5 +144,5 @@ def _cannot_be_told(options: TorqueOptions, chosen: Fitted, rival: Fitted) -> bo
     lead = max(lead, lead - (chosen.told_compared - rival.told_compared))
     if lead < needed:
         return True
-    of_records = lead + (chosen.cost - len(chosen.parameters)) - (rival.cost - len(rival.parameters))
+    of_records = lead + (chosen.cost - chosen.size) - (rival.cost - rival.size)
     return of_records < needed and rival.evidence >= THRESHOLDS.significant

@@ -10,7 +10,7 @@ from functools import partial
 from daq.contracts.progress import Cancel, Progress, stop_if
 from model.discrepancy.diagnosis import Candidate, Step, Suspicion
 from model.discrepancy.engine import holdout
-from model.discrepancy.engine.candidate import Fitted
+from model.discrepancy.engine.candidate import Fitted, numbers_of
 from model.discrepancy.engine.case import Case
 from model.discrepancy.engine.fitting import Fit
 from model.discrepancy.engine.judging import judge, needed_evidence, share_of_rest, suspect
@@ -172,10 +172,11 @@ class Workflow:
         now = self.found.now
         independent = float((now.compared.samples.told / now.memory).min())
         rise = independent * math.log1p(rise_without(now, part.parameters) / independent)
-        if LARGER_PART * rise > needed + len(part.parameters) * math.log(now.compared.samples.told.sum()):
+        size = numbers_of(now, [now.model.by_name[name] for name in part.parameters])
+        if LARGER_PART * rise > needed + size * math.log(now.compared.samples.told.sum()):
             return None
         without = self.found.remove(part)
-        return without if evidence(without.now, self.found.now, len(part.parameters), 1) < needed else None
+        return without if evidence(without.now, self.found.now, size, 1) < needed else None
 
     def _withdraw_lesser_ones(self) -> None:
         """Takes back, the least first, effects that explain less than half of what stays unexplained beside them.

@@ -29,6 +29,7 @@ from model.discrepancy.inverse_dynamics.starts import NONLINEAR, Place, narrowed
 from model.discrepancy.options import TorqueOptions
 from model.effects.effect import Effect
 from model.effects.library import library
+from model.fitting.phases import phase_unknowns
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics.recorded_motion import RecordedMotion, turns_round
 from model.inverse_dynamics.recorded_sizes import recorded_sizes
@@ -170,9 +171,12 @@ def _trial(model: Model, name: str, joints: tuple[int, ...], now: Fit, records: 
     )
     own = tuple(narrowed(p, place) for p in added if p.effect != BENT or p.part in FREED_BENDS)
     amplitudes = tuple(p.name for p in own if p.null is not None)
+    every = (u.parameter for u in phase_unknowns(wider, len(records)))
+    phases = tuple(p for p in every if (p.effect, p.joints) == (name, joints))
+    starts = tuple(starts_of(name, (*own, *phases), place))
     linear = name not in NONLINEAR
     shares = SHARES if linear else (1.0,)
-    return Trial(name, joints, wider, own, amplitudes, tuple(starts_of(name, own, place)), shares=shares, linear=linear)
+    return Trial(name, joints, wider, own, amplitudes, starts, shares=shares, linear=linear, phases=len(phases))
 
 
 def _constant_load(model: Model, name: str, column: int, records: Sequence[RecordedMotion]) -> bool:

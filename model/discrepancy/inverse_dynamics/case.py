@@ -26,10 +26,12 @@ from model.discrepancy.localisation.statistics import LEAST
 from model.discrepancy.options import TorqueOptions
 from model.discrepancy.thresholds import WITHIN_NOISE
 from model.discrepancy.verdict import Errors
+from model.fitting.phases import phase_unknowns
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics.drive_timing import timing_unknowns
 from model.inverse_dynamics.recorded_motion import RecordedMotion
 from model.inverse_dynamics.recorded_sizes import recorded_sizes
+from model.inverse_dynamics.repeats import TorqueNoise
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
@@ -43,11 +45,12 @@ the low-pass, that of accelerations to 2.7."""
 @dataclass(frozen=True, eq=False)
 class TorqueCase(Case):
     """records, unseen: the motions that are fitted to, and that are not. earlier: deviations of numbers, by name, that
-    earlier fits to other records know better."""
+    earlier fits to other records know better. source: of noise in the fitted records."""
 
     records: tuple[RecordedMotion, ...] = ()
     unseen: tuple[RecordedMotion, ...] = ()
     earlier: Mapping[str, float] | None = None
+    source: TorqueNoise | None = None
 
     method: ClassVar[Method] = "inverse-dynamics"
     measure = "torques"
@@ -62,16 +65,18 @@ class TorqueCase(Case):
         own = [u for u in before if u.name not in names]
         sizes = {**recorded_sizes(model, self.records), **added}
         found = [u for u in tolerances(model, names, sizes)[0] if u.name not in {o.name for o in own}]
-        return (*own, *found, *timing_unknowns(model))
+        return (*own, *found, *timing_unknowns(model), *phase_unknowns(model, len(self.records)))
 
     def first(self, unknowns: Sequence[Unknown]) -> Fit:
         """The model as it was given, with its numbers fitted."""
         return fit(self.compared.of_model(self.given), unknowns, {})
 
     def kept(self, now: Fit, wider: Model) -> Iterable[Unknown]:
-        """The unknowns of a fit that a model with a further effect has as well: a delay replaces the lateness."""
-        timing = {u.name for u in timing_unknowns(wider)}
-        return (u for u in now.unknowns if not u.nuisance or u.name in timing)
+        """The unknowns of a fit that a model with a further effect has as well, and those of records that it brings: a
+        delay replaces the lateness, a disturbance has phases."""
+        own = {u.name: u for u in (*timing_unknowns(wider), *phase_unknowns(wider, len(self.records)))}
+        kept = [u for u in now.unknowns if not u.nuisance or u.name in own]
+        return (*kept, *(u for name, u in own.items() if name not in now.values))
 
     def trials(self, clear: Projection, probed: Sequence[Probe]) -> Iterable[Trial]:  # noqa: ARG002 (of another kind)
         """Effects that the model of a fit lacks, and numbers that the file may state wrongly."""
@@ -98,6 +103,11 @@ class TorqueCase(Case):
     def shapes(self, now: Fit) -> tuple[RemainingShape, ...]:
         """What is left, as a torque that a person could write an effect after."""
         return remaining_shapes(now, self.records, self.noise)
+
+    def noise_beside(self, now: Fit) -> Floats:
+        """(n,) noise of a residual, no more than what differs between passages of the same motion beside a model: a
+        torque that goes with time differs as well."""
+        return self.noise if self.source is None else np.minimum(self.noise, self.source.of(now.signals))
 
     def joints_left(self, now: Fit, first: Fit, *, named: bool) -> tuple[int, ...]:  # noqa: ARG002 (its own kind)
         """Joints whose residual is above noise on fitted and on held-out records, and is no noise: far above and
@@ -153,15 +163,27 @@ def torque_case(
     given: Model,
     records: tuple[RecordedMotion, ...],
     unseen: tuple[RecordedMotion, ...],
-    noise: Floats,
+    source: TorqueNoise,
     options: TorqueOptions,
 ) -> TorqueCase:
-    """The case of records. noise: (n,) standard deviation of a residual torque of which only noise is left."""
+    """The case of records."""
+    balance = TorqueBalance(given, records)
+    noise = source.of(balance.residual({}))
     floor = np.maximum(LEAST * noise, 1e-12)
-    compared = TorqueResidual(TorqueBalance(given, records), samples_of(records), floor)
+    compared = TorqueResidual(balance, samples_of(records), floor)
     held = TorqueResidual(TorqueBalance(given, unseen), samples_of(unseen), noise, own_phases=True) if unseen else None
-    earlier = load_posterior(given, (r.name for r in (*records, *unseen)))
-    return TorqueCase(given, compared, held, noise, noise, options, records=records, unseen=unseen, earlier=earlier)
+    return TorqueCase(
+        given,
+        compared,
+        held,
+        noise,
+        noise,
+        options,
+        records=records,
+        unseen=unseen,
+        earlier=load_posterior(given, (r.name for r in (*records, *unseen))),
+        source=source,
+    )
 
 
 def _roots(squares: Floats) -> tuple[float | None, ...]:

@@ -23,7 +23,7 @@ from model.discrepancy.options import DiagnosisOptions, TorqueOptions, check_opt
 from model.inverse_dynamics.drive_limits import find_drives_at_limit
 from model.inverse_dynamics.readings import choose_cutoff
 from model.inverse_dynamics.recorded_motion import recorded_motions
-from model.inverse_dynamics.repeats import noise_left
+from model.inverse_dynamics.repeats import noise_of_torques
 from model.inverse_dynamics.shaking import find_shaking
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
 from model.machine_model.model import Model
@@ -57,7 +57,7 @@ def diagnose_torques(
     cutoff = chosen.cutoff or choose_cutoff(traces, model.machine)
     progress(0.0, f"low-passing the records at {cutoff:g} Hz")
     records, held = (recorded_motions(some, model.machine, cutoff) for some in (traces, held_out))
-    noise = noise_left(model, traces, TorqueBalance(model, records), cutoff)
+    noise = noise_of_torques(model, traces, TorqueBalance(model, records), cutoff)
     case = torque_case(model, records, held, noise, chosen)
     recorded = sum(float(r.time[-1] - r.time[0]) for r in (*records, *held))
     work = Workflow(case, recorded, progress, cancel or Never())

@@ -46,10 +46,9 @@ def _efforts(found: Diagnosis, trace: Trace, cutoff: float, is_held_out: bool) -
     recorded = TorqueBalance(model, records).supplied_by_drive()[0]
     floors = np.array([error.floor for error in found.rmse_fit])
     samples, floor = samples_of(records), np.maximum(floors, 1e-12)
-    asked = (
-        recorded + fit(TorqueResidual(TorqueBalance(one, records), samples, floor), timing_unknowns(one), {}).signals[0]
-        for one in (model, found.model_after)
-    )
+    balances = [TorqueBalance(one, records) for one in (model, found.model_after)]
+    compared = [TorqueResidual(balance, samples, floor, own_phases=True) for balance in balances]
+    asked = [recorded + fit(one, timing_unknowns(one.model), {}).signals[0] for one in compared]
     moving = records[0].moving
     joints = model.machine.modelled_joints
     return TraceSignals(

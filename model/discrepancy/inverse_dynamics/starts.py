@@ -14,6 +14,7 @@ from model.arrays import Floats
 from model.discrepancy.engine.lifted import MOST_OF_A_RECORD, TRIED_QUANTILES
 from model.discrepancy.engine.probing import Start
 from model.discrepancy.excitation import own_frequencies
+from model.fitting.phases import phase_part, phases_of
 from model.inverse_dynamics.drive_timing import MOST
 from model.inverse_dynamics.recorded_motion import RESOLVED, RecordedMotion
 from model.machine_model.model import Model
@@ -169,6 +170,8 @@ PLAY_SHARES = (0.0005, 0.003, 0.02)
 """Free play that is tried, as a share of the joint's travel."""
 USUAL_TONES = 500
 """Rates at which a tone is looked for."""
+FEWEST_OF_TONE = 20
+"""Samples of a record from which a tone is looked for in it."""
 FASTEST_RIPPLE = 1000.0
 """Fastest ripple that is tried, in rad of phase per rad (m)."""
 
@@ -248,7 +251,10 @@ def _ripple(place: Place) -> Iterator[Start]:
     if not prismatic and travel > np.pi:
         whole = np.arange(1, min(int(highest), 200) + 1, dtype=np.float64)
         grid = np.unique(np.concatenate([grid, whole]))
-    for cycles in _peaks(grid, [r.position[r.rows, column] for r in records], place):
+    moving = [r.moving[:, column] for r in records]
+    along = np.concatenate([r.position[r.rows, column][m] for r, m in zip(records, moving, strict=True)])
+    signal = np.concatenate([x[:, column][m] for x, m in zip(place.residual, moving, strict=True)])
+    for cycles in _peaks(grid, [along], [signal]):
         yield {"sine": place.torque, "cosine": place.torque, "cycles": cycles}
 
 
@@ -256,8 +262,12 @@ def _disturbance(place: Place) -> Iterator[Start]:
     longest = max(float(np.ptp(r.time)) for r in place.records)
     grid = _scanned(max(0.05, 2 / longest), 0.8 * place.records[0].cutoff, 0.4 / longest)
     grid = grid[~own_frequencies(grid, [r.speed for r in place.records], place.records[0].period)]
-    for rate in _peaks(2 * np.pi * grid, [r.time[r.rows] for r in place.records], place):
-        yield {"sine": place.torque, "cosine": place.torque, "frequency": rate / (2 * np.pi)}
+    masks = [r.moving[:, place.column] for r in place.records]
+    times = [r.time[r.rows][m] for r, m in zip(place.records, masks, strict=True)]
+    signals = [x[:, place.column][m] for x, m in zip(place.residual, masks, strict=True)]
+    for rate in _peaks(2 * np.pi * grid, times, signals):
+        phases = {phase_part(k): phase for k, phase in enumerate(phases_of(signals, times, rate)) if k > 0}
+        yield {"sine": place.torque, "cosine": place.torque, "frequency": rate / (2 * np.pi), **phases}
 
 
 def _compliance(place: Place) -> Iterator[Start]:
@@ -279,18 +289,16 @@ def _scanned(low: float, high: float, step: float) -> Floats:
     return np.linspace(low, high, int(np.clip((high - low) / step, 2, USUAL_TONES)))
 
 
-def _peaks(rates: Floats, along: Sequence[Floats], place: Place) -> list[float]:
-    """The two rates (rad per unit of `along`) whose sine and cosine explain most of the residual of a joint."""
-    masks = [r.moving[:, place.column] for r in place.records]
-    signal = np.concatenate([x[:, place.column][m] for x, m in zip(place.residual, masks, strict=True)])
-    where = np.concatenate([a[m] for a, m in zip(along, masks, strict=True)])
-    if signal.size < 20:
-        return []
-    signal = signal - signal.mean()
-    power = np.abs(np.exp(-1j * np.outer(rates, where)) @ signal)
-    order = np.argsort(power)[::-1]
+def _peaks(rates: Floats, along: Sequence[Floats], signals: Sequence[Floats]) -> list[float]:
+    """The two rates (rad per unit of `along`) whose sine and cosine, of a phase of its own in each signal (m,), explain
+    most."""
+    power = np.zeros(len(rates))
+    for where, signal in zip(along, signals, strict=True):
+        if signal.size >= FEWEST_OF_TONE:
+            tone = np.exp(-1j * np.outer(rates, where)) @ (signal - signal.mean())
+            power += np.abs(tone) ** 2 / signal.size
     found: list[float] = []
-    for k in order:
+    for k in np.argsort(power)[::-1] if power.any() else ():
         if all(abs(rates[k] - f) > 3 * (rates[1] - rates[0] if len(rates) > 1 else 0) for f in found):
             found.append(float(rates[k]))
         if len(found) == 2:

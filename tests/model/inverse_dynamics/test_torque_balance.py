@@ -19,7 +19,7 @@ from model.fitting.options import FitOptions
 from model.inverse_dynamics.drive_limits import LATER, at_shown_limit, pieces_of, stands_at_limit
 from model.inverse_dynamics.link_motion import link_motion
 from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motion, recorded_motions
-from model.inverse_dynamics.repeats import repeated_noise
+from model.inverse_dynamics.repeats import TorqueNoise
 from model.inverse_dynamics.torque_balance import TorqueBalance, _follow_with_lag
 from model.machine_model.model import base_model
 from model.simulation.prepared import Options
@@ -275,16 +275,20 @@ def residual(record: RecordedMotion, noise: float) -> Floats:
     return moved + noise * np.random.default_rng(1).standard_normal(moved.shape)
 
 
+def noise_of(record: RecordedMotion, residual: Floats, round_: np.ndarray) -> Floats:
+    return TorqueNoise(np.zeros(1), (record,), round_).of([residual])
+
+
 def test_what_differs_between_passages_is_noise_also_of_a_joint_that_turns_round() -> None:
     record = motion(0.1 * np.sin(2 * np.pi * 0.5 * TIME))
     for noise in (0.2, 1.0):
-        found = repeated_noise([record], [residual(record, noise)], ONE_WAY)
+        found = noise_of(record, residual(record, noise), ONE_WAY)
         assert abs(found[0] - noise) < 0.2 * noise
     record = motion(0.1 * np.sin(2 * np.pi * 0.02 * TIME**2) + 0.01 * TIME)
-    assert repeated_noise([record], [residual(record, 1.0)], ONE_WAY)[0] == 0.0
+    assert noise_of(record, residual(record, 1.0), ONE_WAY)[0] == 0.0
     # A torque that repeats every turn is no noise, however far the joint has turned
     record = motion(np.pi * TIME + 0.5 * np.sin(np.pi * TIME))
     torque = 2.0 * np.sin(7 * record.position[record.rows])
     noisy = torque + 0.2 * np.random.default_rng(1).standard_normal(torque.shape)
-    assert 0.18 < repeated_noise([record], [noisy], np.array([True]))[0] < 0.24
-    assert repeated_noise([record], [noisy], ONE_WAY)[0] == 0.0
+    assert 0.18 < noise_of(record, noisy, np.array([True]))[0] < 0.24
+    assert noise_of(record, noisy, ONE_WAY)[0] == 0.0

@@ -154,6 +154,13 @@ def test_formats_whose_makers_state_the_units_are_not_asked_about(tmp_path: Path
     np.testing.assert_allclose(open_trace(comma).position[:, 0], [0.5, 0.75])
 
 
+def test_a_word_after_an_underscore_is_no_joint(tmp_path: Path) -> None:
+    path = file(tmp_path / "speeds.csv", ["0,1,0.5", "0.1,1,0.6", "0.2,1,0.7"], "time,position_cmd,velocity")
+    trace = open_trace(path, choice=Choice(map={"time": "time in s", "velocity": "velocity in rad/s"}))
+    assert trace.record.columns == {"time": "time in s", "velocity": "velocity in rad/s"}
+    assert (trace.joints, trace.velocity is not None) == ((1,), True)
+
+
 def test_joints_with_names_keep_them_and_some_can_be_chosen(tmp_path: Path) -> None:
     head = "t,lift_pos,pan_pos,grip_pos"
     path = file(tmp_path / "a.csv", ["0,1,2,3", "1,1,2,3"], head)

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
 from daq.contracts.machine import load_machine
 from daq.contracts.progress import Never, silent
 from daq.traces.csv_table import import_csv
@@ -13,6 +15,7 @@ from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.options import TorqueOptions
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
 from model.inverse_dynamics.recorded_motion import recorded_motions
+from model.inverse_dynamics.repeats import TorqueNoise
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
 from trials.rigs.folder import write_rig
@@ -24,7 +27,8 @@ def sliding(hidden: Mapping[str, float], options: TorqueOptions) -> Workflow:
     traces = [rigs.slide_trace(seed, hidden, duration=8.0) for seed in (1, 2)]
     cutoff = choose_cutoff(traces, model.machine)
     fitted, held = (recorded_motions([t], model.machine, cutoff) for t in traces)
-    case = torque_case(model, fitted, held, torque_noise(model, traces, cutoff), options)
+    noise = TorqueNoise(torque_noise(model, traces, cutoff), fitted, np.zeros(1, dtype=bool))
+    case = torque_case(model, fitted, held, noise, options)
     return Workflow(case, 16.0, silent, Never())
 
 

@@ -1,5 +1,6 @@
 """Effects that rigs without a known controller hide, named from recorded drive and motion."""
 
+import math
 import threading
 from collections.abc import Mapping
 from dataclasses import replace
@@ -19,6 +20,7 @@ from model.discrepancy.inverse_dynamics.case import torque_case
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.options import DiagnosisOptions, TorqueOptions
 from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motions
+from model.inverse_dynamics.repeats import TorqueNoise
 from model.machine_model.model import Model, base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
 
@@ -201,7 +203,7 @@ def test_a_real_double_pendulum(lab_data: Path) -> None:
     adopted = [(s.effect, s.joints) for s in found.steps if s.adopted]
     assert adopted[0] == ("coulomb_friction", (1, 2))
     held_out = recorded_motions(runs[4:], found.model_after.machine, 12.0)
-    given = torque_case(found.model_after, held_out, (), np.ones(2), TorqueOptions())
+    given = torque_case(found.model_after, held_out, (), noise_of(held_out, 2), TorqueOptions())
     assert given.torque_left(evaluate(given.compared, (), {}, np.ones(2))) < 0.40
     assert found.notes[0].startswith("Torque left unexplained on held-out traces: 67")
 
@@ -211,8 +213,12 @@ def test_a_real_double_pendulum(lab_data: Path) -> None:
 CUTOFF = 8.0
 
 
+def noise_of(records: tuple[RecordedMotion, ...], joints: int) -> TorqueNoise:
+    return TorqueNoise(np.ones(joints), records, np.zeros(joints, dtype=bool))
+
+
 def left_of(model: Model, unseen: tuple[RecordedMotion, ...]) -> np.ndarray:
-    case = torque_case(model, unseen, unseen, np.ones(1), TorqueOptions())
+    case = torque_case(model, unseen, unseen, noise_of(unseen, 1), TorqueOptions())
     return case.held_squares(evaluate(case.compared, (), {}, np.ones(1)))
 
 
@@ -250,6 +256,18 @@ def test_a_disturbance_does_not_vanish_from_a_record_that_does_not_show_it() -> 
     quiet = records(rigs.slide_trace(1, {}, duration=8.0))
     without = left_of(base_model(rigs.slide_machine()), quiet)
     assert left_of(humming(3.0), quiet)[0] > without[0] + 0.5 * 3.0**2 / 2
+
+
+def test_records_that_are_fitted_together_begin_at_phases_of_their_own(hum: Trace) -> None:
+    half = round(0.5 / rigs.SLIDE["hertz"] / float(np.median(np.diff(hum.time))))
+    found = diagnose_torques(
+        base_model(rigs.slide_machine()),
+        [hum, later(rigs.slide_trace(2, {"hum": 3.0}, duration=8.0), half)],
+        options=TorqueOptions(effects=("periodic_disturbance",)),
+    )
+    (step,) = (s for s in found.steps if s.adopted)
+    size = math.hypot(*(v.value for v in step.parameters.values() if v.part in ("sine", "cosine")))
+    assert size == pytest.approx(3.0, rel=0.1)
 
 
 # ---- A number of the machine that is far from its file, and what stands for it.

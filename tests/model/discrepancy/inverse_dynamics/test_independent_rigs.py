@@ -104,7 +104,7 @@ LOADED = "load_dependent_friction"
             "a centre that a load imitates",
             ("axis-current", 506, None),
             "ambiguous",
-            ({"centre_of_mass", "payload"}, (1,)),
+            ({"centre_of_mass", "payload"}, ()),
         ),
         rig("quadratic drag is no viscous friction", ("axis-current", 505, None), "named", ({"quadratic_drag"}, (1,))),
         rig(

@@ -20,6 +20,7 @@ from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.options import TorqueOptions
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
 from model.inverse_dynamics.recorded_motion import recorded_motions
+from model.inverse_dynamics.repeats import TorqueNoise
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
 from tests.model.discrepancy.inverse_dynamics.searches import sliding
@@ -103,7 +104,8 @@ def test_a_weakened_magnet_takes_back_what_the_constants_had_taken() -> None:
     model = base_model(weak_bench())
     cutoff = choose_cutoff(traces, model.machine)
     fitted, held = (recorded_motions([t], model.machine, cutoff) for t in traces)
-    case = torque_case(model, fitted, held, torque_noise(model, traces, cutoff), TorqueOptions())
+    noise = TorqueNoise(torque_noise(model, traces, cutoff), fitted, np.zeros(1, dtype=bool))
+    case = torque_case(model, fitted, held, noise, TorqueOptions())
     flow = Workflow(case, 16.0, silent, Never())
     wider = model.with_effect("weakened_magnet", (1,))
     own = [p for p in wider.parameters if p.effect == "weakened_magnet"]
