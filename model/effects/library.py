@@ -24,16 +24,17 @@ from model.effects.transmission import TRANSMISSION
 BESIDE = {
     "direction_dependent_gear_loss": "gear_loss",
     "direction_dependent_viscous_friction": "viscous_friction",
-    "quadratic_drag": "viscous_friction",
 }
 """Effects that a diagnosis tries only on joints that already have a certain other effect, unless requested by name.
 
 A gear that loses κ only while its motor drives gives the same torque as one that loses κ/2 both ways with a constant
 K_T (1 − κ/2). Within the tolerance of K_T, that is `gear_loss`: trying both at once would make every gear loss
 ambiguous. Friction in proportion to speed in only one direction is no law of the field. Alone, it imitates a constant
-force plus friction. Drag nearly always acts beside viscous friction. Where it acts alone, it makes the viscous friction
-superfluous that was found before it.
+force plus friction.
 """
+RARELY_ALONE = {"quadratic_drag": "viscous_friction"}
+"""Effects that act alone, without a certain other one on their joints, a hundred times more rarely than others do:
+drag nearly always acts beside viscous friction, but a propeller has nothing else."""
 
 _own: dict[str, Effect] = {}
 

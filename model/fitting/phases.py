@@ -29,6 +29,11 @@ def phase_unknowns(model: Model, records: int) -> tuple[Unknown, ...]:
     )
 
 
+def is_phase(unknown: Unknown) -> bool:
+    """Whether an unknown is the phase of a disturbance in one record."""
+    return unknown.trace is not None and unknown.parameter.effect is not None
+
+
 def turned_pairs(model: Model, values: Mapping[str, float], record: int) -> list[tuple[Parameter, float]]:
     """Returns the sines and cosines of a record's disturbances that `values` turn, with their values there."""
     found: list[tuple[Parameter, float]] = []

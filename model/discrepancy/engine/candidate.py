@@ -8,17 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from model.discrepancy.engine.fitting import Fit
-from model.effects.library import find_named_effect
+from model.effects.library import RARELY_ALONE, find_named_effect
 from model.effects.machine_numbers import MACHINE_NUMBERS
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
 ALIKE = 0.97
 """Correlation of what two effects change above which they count as the same."""
-FILE_IS_RIGHT = 2 * float(np.log(100.0))
-"""Handicap of a number of the machine file against effects of the library, as evidence. That a file states a number
-with a deviation and is wrong by many of them is assumed to be a hundred times rarer than an effect that it leaves out:
-on one axis a winding of twice the stated resistance does nearly what a payload does."""
+RARE = 2 * float(np.log(100.0))
+"""Handicap, as evidence, of what is assumed to be a hundred times rarer than an effect that a file leaves out. A file
+rarely states a number with a deviation and is wrong by many of them: on one axis a winding of twice its resistance does
+nearly what a payload does. And some effects rarely act without another one."""
 
 
 def numbers_of(now: Fit, parameters: Sequence[Parameter]) -> int:
@@ -60,7 +60,12 @@ class Fitted:
     @property
     def log_odds(self) -> float:
         """Evidence of all records with the prior odds of its kind: what it competes with other candidates by."""
-        return self.evidence + self.told_compared - (FILE_IS_RIGHT if self.effect in MACHINE_NUMBERS else 0.0)
+        beside = RARELY_ALONE.get(self.effect)
+        alone = beside is not None and not any(
+            use.name == beside and set(self.joints) <= set(use.joints) for use in self.model.effects
+        )
+        rare = alone or self.effect in MACHINE_NUMBERS
+        return self.evidence + self.told_compared - (RARE if rare else 0.0)
 
     def rivals(self, other: Fitted) -> bool:
         """Whether both explain the same joints by different effects."""

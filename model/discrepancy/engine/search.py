@@ -74,9 +74,9 @@ def search(
     for chosen in singles:
         stop_if(cancel)
         progress(0.6, f"fitting {effect_on(chosen[0].trial.effect, _joints(chosen))}")
-        found = work.weigh([*found, work.fit_effect(chosen, work.goal(found))])
+        found = weigh(now, [*found, work.fit_effect(chosen, work.goal(found))])
         _tell(case, probes, found)
-    found = work.weigh(work.refined(found, cancel))
+    found = weigh(now, work.refined(found, cancel))
     found = work.from_expected(found, [p.trial for p in probes])
     for chosen in several:
         best = found[0].log_odds if found else 0.0
@@ -84,15 +84,15 @@ def search(
         if own >= LARGER_PART * best:
             stop_if(cancel)
             progress(0.8, f"fitting {effect_on(chosen[0].trial.effect, _joints(chosen))}")
-            found = work.weigh([*found, work.fit_effect(chosen, work.goal(found))])
-    found = work.weigh(work.refined(found, cancel))
+            found = weigh(now, [*found, work.fit_effect(chosen, work.goal(found))])
+    found = weigh(now, work.refined(found, cancel))
     while found and len(found[0].joints) > 1:
         stop_if(cancel)
         fewer = [p for p in _with_fewer_joints(probes, found[0]) if not _is_fitted(p, found)]
         if not fewer:
             break
-        fits = work.weigh([work.fit_effect(p, work.goal(found)) for p in fewer])
-        found = work.weigh([*found, *work.refined(fits, cancel, found)])
+        fits = weigh(now, [work.fit_effect(p, work.goal(found)) for p in fewer])
+        found = weigh(now, [*found, *work.refined(fits, cancel, found)])
     found = work.narrowed(found)
     _tell(case, probes, found)
     return Findings(now, tuple(found), tuple(probes))
@@ -197,7 +197,7 @@ class _Search:
             else:
                 fitted = case.from_expected(compared, unknowns, begin, now.memory, goal)
             every.append(Fitted(trial.effect, trial.joints, trial.model, trial.parameters, fitted, trial.places))
-        return best_of_each(self.weigh(every))
+        return best_of_each(weigh(self.now, every))
 
     def _at_numbers_of(self, there: Fit) -> Projection:
         """What is left for an effect where the numbers that the fit has far off are as in another one, and stay so: an
@@ -219,7 +219,7 @@ class _Search:
                     last = one.fit
                     values = {name: other.fit.values.get(name, value) for name, value in last.values.items()}
                     again.append(replace(one, fit=fit(last.compared, last.unknowns, values, last.memory, rounds=LONG)))
-        return self.weigh([*found, *again])
+        return weigh(self.now, [*found, *again])
 
     def slopes_without(self, free: set[str]) -> Slopes:
         """Derivatives but those by a candidate's own parameters."""
@@ -246,25 +246,26 @@ class _Search:
             refined.append(one)
         return [*refined, *found[REFINED:]]
 
-    def weigh(self, found: Sequence[Fitted]) -> list[Fitted]:
-        """The candidates with their evidence, best first. A fit without a finite value is none."""
-        now, found = self.now, [f for f in found if math.isfinite(f.fit.cost)]
-        if not found:
-            return []
-        (before, *after), memory = now.compared.descriptions([now.row, *(f.fit.row for f in found)])
-        weighed = []
-        for f, described in zip(found, after, strict=True):
-            cost = cost_of(now, memory, f.size, f.places)
-            fell = float((before - described).sum()) + now.prior - f.fit.prior
-            weighed.append(replace(f, evidence=fell - cost, cost=cost, relieved=max(now.prior - f.fit.prior, 0.0)))
-        return sorted(weighed, key=order_by_odds)
-
 
 def _nearest(begun: Sequence[Start], there: Fit, trial: Trial, unknowns: Sequence[Unknown]) -> Start:
     """The start of the lowest cost: what gives or has play is not in proportion to its size."""
     compared = there.compared.of_model(trial.model)
     tried = [evaluate(compared, unknowns, start_values(unknowns, one), there.memory) for one in begun]
     return min(zip(tried, begun, strict=True), key=lambda pair: pair[0].cost)[1]
+
+
+def weigh(now: Fit, found: Sequence[Fitted]) -> list[Fitted]:
+    """Candidates beside the fit without them, with their evidence, best first. A fit without a finite value is none."""
+    found = [f for f in found if math.isfinite(f.fit.cost)]
+    if not found:
+        return []
+    (before, *after), memory = now.compared.descriptions([now.row, *(f.fit.row for f in found)])
+    weighed = []
+    for f, described in zip(found, after, strict=True):
+        cost = cost_of(now, memory, f.size, f.places)
+        fell = float((before - described).sum()) + now.prior - f.fit.prior
+        weighed.append(replace(f, evidence=fell - cost, cost=cost, relieved=max(now.prior - f.fit.prior, 0.0)))
+    return sorted(weighed, key=order_by_odds)
 
 
 def improved(before: Fit, after: Fit) -> Fit | None:

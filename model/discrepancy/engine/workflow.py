@@ -12,6 +12,7 @@ from model.discrepancy.diagnosis import Candidate, Step, Suspicion
 from model.discrepancy.engine import holdout
 from model.discrepancy.engine.candidate import Fitted, numbers_of
 from model.discrepancy.engine.case import Case
+from model.discrepancy.engine.exchange import challengers, in_place_of
 from model.discrepancy.engine.fitting import Fit
 from model.discrepancy.engine.judging import judge, needed_evidence, share_of_rest, suspect
 from model.discrepancy.engine.probing import rise_without
@@ -24,6 +25,7 @@ from model.discrepancy.engine.search import (
     prefer_fewer_joints,
     prefer_shorter_laws,
     search,
+    weigh,
 )
 from model.discrepancy.engine.standing import Standing, begin
 from model.discrepancy.engine.step_record import list_tried, record_step, rivals_of
@@ -50,6 +52,8 @@ class Workflow:
     notes: list[Note] = field(default_factory=list)
     suspicion: Suspicion | None = None
     rivals: tuple[Fitted, ...] = ()
+    places: dict[int, tuple[Fitted, ...]] = field(default_factory=dict)
+    """By number of a step, its effect and those that may stand in its place."""
     left: tuple[int, ...] = ()
     """Joints on which more is left than noise, and is no noise."""
 
@@ -82,6 +86,7 @@ class Workflow:
                 break
             self._report(0.9, "what is not needed any more")
             self._prune(len(before.steps))
+            self._exchange()
 
     def _report(self, fraction: float, text: str) -> None:
         stop_if(self.cancel)
@@ -142,6 +147,7 @@ class Workflow:
             steps.append(record_step(found, findings, compared, [*refused, *passed_over]))
             if compared.refusal is None:
                 self.rivals = (chosen, *rivals_of(found, findings, chosen, [*refused, *passed_over]))
+                self.places[len(steps) - 1] = challengers(chosen, findings.fitted)
                 return replace(found.take(chosen), steps=tuple(steps))
             refused.append(chosen)
         return replace(found, steps=tuple(steps))
@@ -165,6 +171,28 @@ class Workflow:
                     joints = tuple(j for j in left.joints if j != joint)
                     fewer = left.model_copy(update={"joints": joints, "parameters": others})
                     self.found = replace(without, steps=_with(self.found.steps, number, fewer))
+
+    def _exchange(self) -> None:
+        """Puts a rival in the place of an earlier step on the joints of the latest one where it explains more beside
+        that."""
+        *earlier, latest = self.found.steps
+        for number, step in enumerate(earlier):
+            rivals = self.places.get(number, ())
+            apart = step.joints and latest.joints and not set(step.joints) & set(latest.joints)
+            if not step.adopted or apart or len(rivals) < 2 or rivals[0].joints != step.joints:
+                continue
+            without, fits = in_place_of(step, self.found, rivals)
+            ranked = sorted(self._with_held_out(without, weigh(without.now, fits)), key=order_by_odds)
+            ranked = prefer_shorter_laws(ranked, without.now, self.case.options.least_margin)
+            ranked = [f for f in ranked if self.case.is_resolved(f, without.now)]
+            if not ranked or ranked[0].effect == step.effect:
+                continue
+            compared = judge(without, ranked[0], ())
+            if compared is None or compared.refusal is not None:
+                continue
+            other = record_step(without, Findings(without.now, tuple(ranked), ()), compared, ())
+            self.found = replace(without.take(ranked[0]), steps=_with(self.found.steps, number, other))
+            self.places[number] = tuple(ranked)
 
     def _if_superfluous(self, part: Step, needed: float) -> Standing | None:
         """The standing without an effect, if all the others explain as much but for evidence that is less than

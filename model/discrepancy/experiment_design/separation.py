@@ -97,8 +97,8 @@ class Prediction:
     def begun(self) -> dict[str, float]:
         """The fitted values with the starts, at rest."""
         values = {u.name: self.fit.values[u.name] for u in self.shared}
-        vector, _ = self.compared.state(values)
-        return {**values, **starts_at_rest(self.there.observation, vector, self.there.starts)}
+        vectors, _ = self.compared.state(values)
+        return {**values, **starts_at_rest(self.there.observation, vectors[0], self.there.starts)}
 
     def recorded(self) -> Prediction:
         """The same on the record that an arm like the model would leave. Not finite where its simulation is not."""

@@ -37,6 +37,7 @@ from model.discrepancy.thresholds import FEEDBACK_SHARE, LARGER_PART, THRESHOLDS
 from model.discrepancy.verdict import Errors, unexplained
 from model.effects.library import effect
 from model.fitting.covariance import inverse
+from model.fitting.phases import phase_unknowns
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 from model.machine_model.parameter import Kind, Parameter
@@ -82,7 +83,11 @@ class ReadingCase(Case):
     def unknowns(self, model: Model, added: Mapping[str, Parameter]) -> tuple[Unknown, ...]:
         """Numbers of the file within their tolerances, bends, postures, the form of friction; and those added."""
         own = (u for u in self.base if u.name not in added)
-        return (*own, *(free_unknown(added[p.name]) for p in model.parameters if p.name in added))
+        numbers = (free_unknown(added[p.name]) for p in model.parameters if p.name in added)
+        return (*own, *numbers, *self._phases(model))
+
+    def _phases(self, model: Model) -> tuple[Unknown, ...]:
+        return phase_unknowns(model, len(self.compared.observation.records))
 
     def first(self, unknowns: Sequence[Unknown]) -> Fit:
         """The tolerance parameters, fitted in the closed loop first, which is robust far from the solution; then along
@@ -116,9 +121,9 @@ class ReadingCase(Case):
         values = {**ended.values, **across}
         return min(ended, fit(ended.compared, ended.unknowns, values, ended.memory, goal=goal), key=lambda f: f.cost)
 
-    def kept(self, now: Fit, wider: Model) -> Iterable[Unknown]:  # noqa: ARG002 (an effect replaces none)
-        """The unknowns of a fit that a model with a further effect has as well."""
-        return now.unknowns
+    def kept(self, now: Fit, wider: Model) -> Iterable[Unknown]:
+        """The unknowns of a fit that a model with a further effect has as well, and phases that it brings."""
+        return (*now.unknowns, *(u for u in self._phases(wider) if u.name not in now.values))
 
     def trials(self, clear: Projection, probed: Sequence[Probe]) -> Iterator[Trial]:
         """Effects that the model of a fit lacks; flexible gears, which take five times as long to simulate, last, and
@@ -249,10 +254,10 @@ class ReadingCase(Case):
         """
         assert self.held_out is not None
         clear = projection(now.with_slopes())
-        own = [k for k, u in enumerate(now.unknowns) if u.kind is not Kind.INITIAL_POSITION]
+        own = [k for k, u in enumerate(now.unknowns) if u.trace is None]
         numbers = [now.unknowns[k] for k in own]
         held, scale = replace(self.held_out, own=()).of_model(now.model), np.array([u.scale for u in numbers])
-        values = {u.name: now.values[u.name] for u in numbers}  # start postures are of other records
+        values = {u.name: now.values[u.name] for u in numbers}  # postures and phases are of other records
         rows, left = held.slopes(values, numbers), held.samples.flat(self.held(now))
         if not (np.isfinite(rows).all() and np.isfinite(left).all()):
             return self.held_squares(now)

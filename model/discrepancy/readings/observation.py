@@ -42,8 +42,8 @@ from model.simulation.simulate import at_rows
 
 Signals = tuple[Floats, ...]
 """One array (m, n) a record."""
-State = tuple[Floats, list[Floats]]
-"""What a simulation begins with: the model's flat vector, and initial states (n, 2) of every record."""
+State = tuple[list[Floats], list[Floats]]
+"""What a simulation begins with in every record: the model's flat vector, and initial states (n, 2)."""
 
 STEP, COARSE_STEP = 2e-3, 7e-3
 """Longest step of integration, s: ten steps per control period of 20 ms, and three for probes, which are
@@ -188,30 +188,31 @@ class Observation:
         Returns:
             per record (p, columns, k, n), in the order of `model.simulation.period`.
         """
-        vectors = np.stack([vector for vector, _ in states])
-        initials = [np.stack([own[t] for _, own in states]) for t in range(len(self.records))]
+        vectors, initials = (
+            [np.stack([state[part][t] for state in states]) for t in range(len(self.records))] for part in (0, 1)
+        )
         longest = max(len(r.inputs) for r in self.records)
         count = len(self.records)
         found: list[list[Floats]] = [[] for _ in self.records]
-        for begin in range(0, len(vectors), BATCH):
-            own = vectors[begin : begin + BATCH]
-            which = np.repeat(np.arange(count), len(own))
+        for begin in range(0, len(states), BATCH):
+            batch = slice(begin, begin + BATCH)
+            own, starts = (np.concatenate([part[batch] for part in parts]) for parts in (vectors, initials))
+            size = len(own) // count
+            which = np.repeat(np.arange(count), size)
             out = np.zeros((len(which), OUTPUTS, longest, model.joint_count), dtype=np.float64)
-            starts = np.concatenate([i[begin : begin + BATCH] for i in initials])
-            repeated = np.ascontiguousarray(np.tile(own, (count, 1)))
             left, step = (
                 np.arange(len(which)),
                 min(longest_step, longest_step_of(model), _step_of_contacts(model, own, longest_step)),
             )
             for _ in range(1 + HALVINGS):
-                tried = BatchRun(model, self.prepared, which[left], repeated[left], starts[left], step).run()
+                tried = BatchRun(model, self.prepared, which[left], own[left], starts[left], step).run()
                 out[left] = tried
                 left = left[~np.isfinite(tried[:, OUT_READING]).all(axis=(1, 2))]
                 if not len(left):
                     break
                 step /= 2
             for t, record in enumerate(self.records):
-                rows = slice(t * len(own), (t + 1) * len(own))
+                rows = slice(t * size, (t + 1) * size)
                 found[t].append(out[rows][:, list(columns), : len(record.inputs)])
         return [np.concatenate(parts) for parts in found]
 
@@ -220,15 +221,15 @@ class Observation:
     ) -> list[Floats]:
         """Exact derivatives (p, m, n) of the simulated readings of every record, rad by each unknown's unit; not finite
         where a run diverged. longest_step: of the integration, s."""
-        vector, initials = state
+        vectors, initials = (np.stack(part) for part in state)
         count = len(self.records)
-        step = min(longest_step, longest_step_of(model), _step_of_contacts(model, vector[None], longest_step))
+        step = min(longest_step, longest_step_of(model), _step_of_contacts(model, vectors, longest_step))
         batch = BatchRun(
             model,
             self.prepared,
             np.arange(count),
-            np.tile(vector, (count, 1)),
-            np.stack(initials),
+            vectors,
+            initials,
             step,
             outputs=(OUT_READING,),
         )

@@ -14,6 +14,7 @@ from model.discrepancy.engine.fitting import fit
 from model.discrepancy.engine.residual import Samples, Signals, Values
 from model.discrepancy.readings.noise_model import fit_noise_model
 from model.discrepancy.readings.observation import STEP, Observation, State, difference, step_of_derivatives
+from model.fitting.phases import is_phase, turned_pairs
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 from model.machine_model.parameter import Kind
@@ -86,7 +87,13 @@ class ReadingResidual:
             elif unknown is not None:
                 for t in range(len(initials)) if unknown.trace is None else (unknown.trace,):
                     initials[t][parameter.initial] += value
-        return vector, initials
+        vectors = [vector] * len(initials)
+        for t in range(1, len(initials)):
+            if turned := turned_pairs(self.model, values, t):
+                vectors[t] = vector.copy()
+                for p, value in turned:
+                    vectors[t][list(p.slots)] = value
+        return vectors, initials
 
     def at(self, values: Values) -> Signals:
         """Residuals (m, n) of every record. Not finite where the simulation is not."""
@@ -146,11 +153,11 @@ class ReadingResidual:
     def changes(self, base: Values, moved: Sequence[Values]) -> Floats:
         """(k, N) by which the residual differs at other values, with the long step of integration."""
         step = step_of_derivatives(self.model)
-        vector, initials = self.state(base)
-        key = step, vector.tobytes() + b"".join(i.tobytes() for i in initials)
+        first_state = self.state(base)
+        key = step, b"".join(one.tobytes() for part in first_state for one in part)
         states = [self.state(values) for values in moved]
         if key not in self._bases:
-            states = [(vector, initials), *states]
+            states = [first_state, *states]
         if not states:
             return np.zeros((0, sum(self.samples.sizes)))
         shown = self.observation.readings(self.model, states, step)
@@ -171,7 +178,12 @@ class ReadingResidual:
         seconds = max(len(r.inputs) * r.inputs.period for r in self.observation.records)
         moves = np.array([difference(self.model, u, values[u.name], seconds) for u in unknowns])
         largest = np.abs(rows).max(axis=1, initial=0.0) * np.abs(moves)
-        wild = [k for k, size in enumerate(largest) if not size < self.observation.range_of_motion]
+        turned = {p.name for pair in self.model.disturbances for p in pair} if len(self.observation.records) > 1 else ()
+        wild = [
+            k
+            for k, (u, size) in enumerate(zip(unknowns, largest, strict=True))
+            if u.name in turned or is_phase(u) or not size < self.observation.range_of_motion
+        ]
         if wild:
             moved = [{**values, unknowns[k].name: values[unknowns[k].name] + moves[k]} for k in wild]
             rows[wild] = self.changes(values, moved) / moves[wild, None]

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ from model.discrepancy.readings.trials import tone_trial
 from model.discrepancy.thresholds import THRESHOLDS
 from model.effects.effect import Tone
 from model.effects.library import effect, library
+from model.fitting.phases import phase_unknowns
 from model.fitting.records import Record
 from model.machine_model.effect_parameters import effect_parameters
 from model.machine_model.model import Model
@@ -224,40 +226,59 @@ def _best_tone(
     columns = compared.samples.columns[column]
     blocks = math.ceil(len(rates) * (columns.stop - columns.start) / BLOCK)
     gains = np.concatenate(
-        [
-            _gains(clear, observation, over, column, columns, own, response)
-            for own in np.array_split(rates, max(1, blocks))
-        ]
+        [_gains(clear, observation, over, column, own, response) for own in np.array_split(rates, max(1, blocks))]
     )
     places, model = max(USUAL_TONES, len(rates)), now.fitted_model
 
+    rate = f"joint{joint}.{name}.{over.value}"
+
     def trial(tried: Floats) -> Trial | None:
-        return tone_trial(model, name, joint, over, tried, float(rates[0]), places, observation)
+        found = tone_trial(model, name, joint, over, tried, float(rates[0]), places, observation)
+        if found is None or over is Tone.OVER_POSITION:
+            return found
+        unknowns = phase_unknowns(found.model, len(observation.records))
+        own = [u.name for u in unknowns if (u.parameter.effect, u.joints) == (name, (joint,))]
+        chosen = np.array([start[rate] for start in found.starts])
+        parts = _by_record(clear, observation, over, column, chosen, response)
+        phases = np.array([np.arctan2(second, first) for _, first, second in parts])
+        starts = (
+            {**start, **dict(zip(own, (phases[1:, k] - phases[0, k]).tolist(), strict=True))}
+            for k, start in enumerate(found.starts)
+        )
+        return replace(found, starts=tuple(starts), phases=len(own))
 
     proposed = trial(rates[_peaks(gains)])
     if proposed is None or gains.max() < THRESHOLDS.interesting:
         return proposed
-    rate = f"joint{joint}.{name}.{over.value}"
     best = clear.nearest(proposed)[rate] + _alike(observation, over, column) * AROUND
     around = trial(np.clip(best, rates[0], rates[-1]))
     return None if around is None else replace(around, starts=(clear.nearest(around),))
 
 
 def _gains(
-    clear: Projection,
-    observation: Observation,
-    over: Tone,
-    column: int,
-    columns: slice,
-    rates: Floats,
-    response: Floats,
+    clear: Projection, observation: Observation, over: Tone, column: int, rates: Floats, response: Floats
 ) -> Floats:
     """How much tones of these rates take off the cost, (k,), by the spectrum."""
-    now = clear.now
-    waves = [_passed(now, observation, over, column, rates, response, t) for t in range(len(observation.records))]
+    return np.sum([gain for gain, _, _ in _by_record(clear, observation, over, column, rates, response)], axis=0)
+
+
+def _by_record(
+    clear: Projection, observation: Observation, over: Tone, column: int, rates: Floats, response: Floats
+) -> list[tuple[Floats, Floats, Floats]]:
+    """What tones of these rates take off the cost, and their sines and cosines, up to their sign, (k,) each: in each
+    record, where each begins at a phase of its own; in all together, where the position decides it."""
+    now, every = clear.now, range(len(observation.records))
+    waves = [_passed(now, observation, over, column, rates, response, t) for t in every]
     shown = np.concatenate(waves, axis=1)
     sine, cosine = (now.weighted(-part, column) for part in (shown.imag, shown.real))
-    return _explained(clear, sine, cosine, columns)
+    columns = now.compared.samples.columns[column]
+    if over is Tone.OVER_POSITION:
+        return [_explained(clear, sine, cosine, columns)]
+    edges = np.cumsum([0, *(wave.shape[1] for wave in waves)])
+    return [
+        _explained(clear, sine[:, a:b], cosine[:, a:b], slice(columns.start + a, columns.start + b))
+        for a, b in pairwise(edges.tolist())
+    ]
 
 
 def _peaks(gains: Floats) -> NDArray[np.int64]:
@@ -267,10 +288,10 @@ def _peaks(gains: Floats) -> NDArray[np.int64]:
     return np.asarray(peaks[np.argsort(-gains[peaks])][:PEAKS])
 
 
-def _explained(clear: Projection, sine: Floats, cosine: Floats, columns: slice) -> Floats:
-    """How much pairs of signals (k, m) take off the cost, (k,)."""
+def _explained(clear: Projection, sine: Floats, cosine: Floats, columns: slice) -> tuple[Floats, Floats, Floats]:
+    """How much pairs of signals (k, m) take off the cost, and how much of each does, up to the sign, (k,) each."""
     sines, cosines, mixed, by_sine, by_cosine = clear.pairs(sine, cosine, columns)
     determinant = np.maximum(sines * cosines - mixed**2, 1e-9 * sines * cosines + 1e-30)
     first = (cosines * by_sine - mixed * by_cosine) / determinant
     second = (sines * by_cosine - mixed * by_sine) / determinant
-    return np.asarray(first * by_sine + second * by_cosine)
+    return np.asarray(first * by_sine + second * by_cosine), first, second

@@ -9,7 +9,7 @@ from daq.contracts.machine import Machine
 from daq.contracts.progress import Never, silent
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.engine import holdout
-from model.discrepancy.engine.candidate import FILE_IS_RIGHT, Fitted
+from model.discrepancy.engine.candidate import RARE, Fitted
 from model.discrepancy.engine.fitting import Fit
 from model.discrepancy.engine.search import prefer_fewer_joints, prefer_shorter_laws, search
 from model.discrepancy.engine.workflow import Workflow
@@ -66,7 +66,7 @@ def test_the_file_is_trusted_against_an_effect_but_not_against_any_evidence() ->
     flow = sliding({"coulomb": 8.0}, TorqueOptions())
     load = candidate("payload", flow, 40.0)
     assert candidate("wrong_resistance", flow, 40.0).log_odds < load.log_odds
-    assert candidate("wrong_resistance", flow, 41.0 + FILE_IS_RIGHT).log_odds > load.log_odds
+    assert candidate("wrong_resistance", flow, 41.0 + RARE).log_odds > load.log_odds
     assert candidate("gear_loss", flow, 30.0, told=15.0).log_odds > load.log_odds
 
 

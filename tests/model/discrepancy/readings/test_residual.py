@@ -13,10 +13,11 @@ from model.discrepancy.readings.case import ReadingCase, noise_floor
 from model.discrepancy.readings.noise_model import shown_noise
 from model.discrepancy.readings.observation import STEP, difference
 from model.discrepancy.readings.residual import ReadingResidual
+from model.fitting.phases import is_phase
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 from model.machine_model.parameter import Kind
-from tests.model.discrepancy.readings.cases import case_of
+from tests.model.discrepancy.readings.cases import case_of, fitted, searched
 from tests.model.fitting import imagined
 
 SECONDS = 3.0
@@ -140,6 +141,20 @@ def test_every_held_out_record_has_a_posture_of_its_own_at_the_start() -> None:
 def test_every_held_out_record_has_a_phase_of_its_own() -> None:
     for left in left_on(humming(0.0), humming(1.6), humming(5.0)):
         assert np.all(left < 1.15)
+
+
+def test_records_that_are_fitted_together_have_phases_of_their_own() -> None:
+    phases = (0.0, 1.6, 5.0)
+    traces = [imagined.trace(humming(p), k, seconds=4.0) for k, p in enumerate(phases)]
+    findings = searched(case := case_of(imagined.arm(), traces, effects=("periodic_disturbance",)), fitted(case))
+    best = findings.fitted[0]
+    values = {p.part: best.fit.values[p.name] for p in best.parameters}
+    assert (best.joints, values["frequency"]) == ((2,), pytest.approx(HERTZ, abs=0.01))
+    assert np.hypot(values["sine"], values["cosine"]) == pytest.approx(SIZE, rel=0.1)
+    found = [best.fit.values[u.name] for u in best.fit.unknowns if is_phase(u)]
+    wrong = np.angle(np.exp(1j * (np.array(found) - phases[1:])))
+    assert np.abs(wrong).max() < 0.1
+    assert np.all(np.sqrt(best.fit.squares) < 1.15 * best.fit.compared.floor)
 
 
 def test_a_disturbance_does_not_vanish_from_records_that_do_not_show_it() -> None:
