@@ -10,8 +10,11 @@ from daq.contracts.progress import Never, silent
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.engine import holdout
 from model.discrepancy.engine.candidate import RARE, Fitted
+from model.discrepancy.engine.exchange import challengers
 from model.discrepancy.engine.fitting import Fit
+from model.discrepancy.engine.judging import compare
 from model.discrepancy.engine.search import prefer_fewer_joints, prefer_shorter_laws, search
+from model.discrepancy.engine.step_record import record_step
 from model.discrepancy.engine.workflow import Workflow
 from model.discrepancy.explanation.answer_words import what_is_left
 from model.discrepancy.inverse_dynamics.candidates import take_back
@@ -68,6 +71,35 @@ def test_the_file_is_trusted_against_an_effect_but_not_against_any_evidence() ->
     assert candidate("wrong_resistance", flow, 40.0).log_odds < load.log_odds
     assert candidate("wrong_resistance", flow, 41.0 + RARE).log_odds > load.log_odds
     assert candidate("gear_loss", flow, 30.0, told=15.0).log_odds > load.log_odds
+
+
+def test_drag_is_rare_without_viscous_friction() -> None:
+    flow = sliding({"coulomb": 8.0}, TorqueOptions())
+    alone = candidate("quadratic_drag", flow, 40.0)
+    beside = replace(alone, model=flow.found.model.with_effect("viscous_friction", (1,)))
+    assert beside.log_odds - alone.log_odds == pytest.approx(RARE)
+
+
+@pytest.mark.slow
+def test_drag_that_acts_alone_is_named_alone() -> None:
+    found = slide(("viscous_friction", "quadratic_drag", "coulomb_friction"), drag=80.0)
+    assert adopted(found) == {("quadratic_drag", (1,))}
+
+
+def test_rivals_of_a_step_are_fitted_in_its_place() -> None:
+    """Coulomb friction acts, and another law was taken for it before the disturbance was known."""
+    effects = ("coulomb_friction", "gear_loss", "periodic_disturbance")
+    flow = sliding({"coulomb": 6.0, "hum": 8.5}, TorqueOptions(effects=effects, least_evidence=10.0))
+    before, findings = flow._searched()
+    right, wrong = (next(f for f in findings.fitted if f.effect == name) for name in effects[:2])
+    assert challengers(right, findings.fitted)[0] is right
+    taken = record_step(before, findings, compare(before, wrong), ())
+    flow.found = replace(before.take(wrong), steps=(taken,))
+    flow.places[0] = (wrong, right)
+    flow.found = flow._adopt(*flow._searched())
+    assert [s.effect for s in flow.found.steps] == ["gear_loss", flow.found.steps[1].effect]
+    flow._exchange()
+    assert flow.found.steps[0].effect == "coulomb_friction"
 
 
 def test_a_joint_that_brings_little_is_not_named_with_the_others() -> None:
