@@ -37,7 +37,6 @@ WORDS = {
     "validate": "ma2000 {trace}",
     "audit": "",
     "backup": "saved.tar",
-    "notify": "test",
     "restore": "saved.tar",
     "serve": "",
     "token": "ls",

@@ -9,7 +9,6 @@ PLUGIN = Plugin(
             "Try the notifications of the configuration.",
             "extras.lab.notifications.command",
             about="service",
-            needs="server",
             group="Service",
         ),
     ),
