@@ -203,7 +203,7 @@ class _Search:
         """What is left for an effect where the numbers that the fit has far off are as in another one, and stay so: an
         effect that they imitate explains nothing beside them. By the fit's own derivatives, which follow the record."""
         now = self.now
-        far = {u.name for u in far_off(now)}
+        far = [u.name for u in far_off(now)]  # in their order: a sum in that of a set differs from run to run
         row = now.row + sum((there.values[name] - now.values[name]) * self.slopes[name] for name in far)
         near = tuple(u for u in now.unknowns if u.name not in far)
         return projection(replace(now, unknowns=near, row=row, known={u.name: self.slopes[u.name] for u in near}))
