@@ -95,9 +95,8 @@ EXTERNAL = (
         source="a preload, a counterweight on an axis that stays level, or an offset of a current or torque sensor",
         parameters=(torque_parameter("torque", at.CONSTANT_TORQUE),),
     ),
-    # Its phase counts from the start of a record, so each record needs a phase of its own. Held-out records get one
-    # (`model.discrepancy.output_error.holdout`). Records that are fitted together share one, which is exact only for a
-    # single record.
+    # Its phase counts from the start of the first record; every other one has a phase of its own
+    # (`model.fitting.phases`).
     Effect(
         "periodic_disturbance",
         physics="τ = a sin(2πft) + b cos(2πft), t from the start of the record",
