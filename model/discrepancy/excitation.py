@@ -20,7 +20,7 @@ PEAK = 0.1
 AROUND = ((-8, -7, -6, -5, -4), (4, 5, 6, 7, 8))
 """Bins of a frequency's surroundings below and above, from its own."""
 PERIODS = 4
-"""Least number of periods in a record: what a short motion repeats less often is no frequency."""
+"""Least number of periods in a record: what a motion, or a torque, repeats less often is no frequency."""
 
 
 def own_frequencies(frequencies: Floats, speeds: Sequence[Floats], period: float) -> Mask:

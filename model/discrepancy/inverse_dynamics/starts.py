@@ -13,7 +13,7 @@ from model import layout as at
 from model.arrays import Floats
 from model.discrepancy.engine.lifted import MOST_OF_A_RECORD, TRIED_QUANTILES
 from model.discrepancy.engine.probing import Start
-from model.discrepancy.excitation import own_frequencies
+from model.discrepancy.excitation import PERIODS, own_frequencies
 from model.fitting.phases import phase_part, phases_of
 from model.inverse_dynamics.drive_timing import MOST
 from model.inverse_dynamics.recorded_motion import RESOLVED, RecordedMotion
@@ -124,6 +124,11 @@ class Place:
         return max(float(np.ptp(r.time)) for r in self.records)
 
     @property
+    def slowest_disturbance(self) -> float:
+        """Hz, of one that repeats itself in a record."""
+        return PERIODS / self.duration
+
+    @property
     def torque(self) -> float:
         """A tenth of the drive's torque, N·m or N: a size to probe with."""
         return max(0.1 * abs(self.gain) * float(np.sqrt(np.mean(self.drives**2))), 1e-9)
@@ -196,7 +201,7 @@ def narrowed(p: Parameter, place: Place) -> Parameter:  # noqa: PLR0911 (one lin
     ever acts would explain any motion, with bodies without mass. Friction must not fade within the speeds at which its
     direction is not resolved, nor beyond those that were recorded. A spring on one side must begin to pull within the
     recorded positions, and before the last hundredth of the travel. A ripple repeats itself within them: less than most
-    of a wave is a spring, or a shifted sensor.
+    of a wave is a spring, or a shifted sensor. A disturbance repeats itself in time.
     """
     if p.effect == "stribeck_friction" and p.null is None:
         slowest = RESOLVED * max(float(r.turning[place.column]) for r in place.records)
@@ -213,6 +218,8 @@ def narrowed(p: Parameter, place: Place) -> Parameter:  # noqa: PLR0911 (one lin
         return replace(p, high=max(p.low, min(p.high, place.passed_drive)))
     if p.effect == "torque_ripple" and p.null is None:
         return replace(p, low=min(p.high, max(p.low, place.slowest_ripple)))
+    if p.effect == "periodic_disturbance" and p.null is None:
+        return replace(p, low=min(p.high, max(p.low, place.slowest_disturbance)))
     if p.effect != "supply_limit":
         return p
     return replace(p, low=min(p.high, max(p.low, float(np.quantile(place.drives, UNLIMITED)))))
@@ -259,8 +266,7 @@ def _ripple(place: Place) -> Iterator[Start]:
 
 
 def _disturbance(place: Place) -> Iterator[Start]:
-    longest = max(float(np.ptp(r.time)) for r in place.records)
-    grid = _scanned(max(0.05, 2 / longest), 0.8 * place.records[0].cutoff, 0.4 / longest)
+    grid = _scanned(place.slowest_disturbance, 0.8 * place.records[0].cutoff, 0.4 / place.duration)
     grid = grid[~own_frequencies(grid, [r.speed for r in place.records], place.records[0].period)]
     masks = [r.moving[:, place.column] for r in place.records]
     times = [r.time[r.rows][m] for r, m in zip(place.records, masks, strict=True)]

@@ -20,7 +20,7 @@ from model.arrays import Floats
 from model.discrepancy.engine.fitting import Fit
 from model.discrepancy.engine.probing import Projection, Trial
 from model.discrepancy.engine.residual import Samples
-from model.discrepancy.excitation import own_frequencies
+from model.discrepancy.excitation import PERIODS, own_frequencies
 from model.discrepancy.readings.observation import DIFFERENCE, Observation
 from model.discrepancy.readings.residual import ReadingResidual
 from model.discrepancy.readings.trials import tone_trial
@@ -92,7 +92,7 @@ def rates_tried(observation: Observation, name: str, joint: int) -> Floats:
         low, step = alike / 2, alike / 8
     else:
         high = min(high, HIGHEST, 0.4 / observation.records[0].inputs.period)
-        low, step = 2 * alike, alike / 2
+        low, step = PERIODS * alike, alike / 2
     if not low < high:
         return np.zeros(0)
     span = high - low
