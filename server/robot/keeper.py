@@ -33,9 +33,14 @@ class Keeper:
         self._thread.start()
 
     def connect(self) -> None:
-        """Connects, and keeps the robot connected. Raises ReachError if it cannot be reached; the thread retries."""
+        """Connects, and keeps the robot connected. Raises ReachError if it cannot be reached; the thread retries.
+
+        A lost link gets a new process: a person asks, and the old one only tries again what has not come back.
+        """
         with self._changed:
             self._wanted = True
+        if self._robot.connection == "lost":
+            self._robot.disconnect(PATIENCE)
         self._robot.connect(anew=True, wanted=self._is_wanted)
         self._wake()
 

@@ -10,6 +10,8 @@ import pytest
 
 from daq.contracts.errors import ReachError
 from daq.contracts.machine import load_machine
+from daq.contracts.service.robot import RobotIdentity
+from daq.owner.messages import ArmReport, Opened, Report
 from server.robot.keeper import Keeper
 from server.robot.robot import Robot, RobotPlace
 from tests.server.clocks import HandClock
@@ -80,6 +82,29 @@ def test_nothing_is_begun_that_is_not_wanted_any_more(owners: Any, robot: Any, e
     owners.go.set()
     _refused(keeper.connect)
     assert owners.made == []
+
+
+class GreetingOwner(SlowOwner):
+    """Greets, and the first one then loses its link."""
+
+    def __init__(self, opening: object, report: Callable[[Report], None], ended: Callable[[str], None]) -> None:
+        super().__init__(opening, report, ended)
+        report(Opened(identity=RobotIdentity(simulated=True, protocol=2, period=0.02, boots=len(self.made))))
+        link: Any = "lost" if len(self.made) == 1 else "connected"
+        report(ArmReport(arm="idle", cause="", activity="none", limp=(), link=link, counters={}))
+
+
+def test_who_connects_after_a_lost_link_gets_a_new_process() -> None:
+    class Owners(GreetingOwner):
+        made, begun, go = [], threading.Event(), threading.Event()
+
+    Owners.go.set()
+    robot = Robot(RobotPlace("ma2000", "mock://", load_machine("ma2000"), Path()), HandClock(), Owners)
+    keeper = Keeper(robot)
+    keeper.connect()
+    assert robot.connection == "lost"
+    keeper.connect()
+    assert (robot.connection, [one.closed for one in Owners.made]) == ("connected", [True, False])
 
 
 def _refused(connect: Callable[[], None]) -> None:
