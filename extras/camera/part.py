@@ -141,10 +141,14 @@ class Camera:
         """Yields pictures at the configured rate at most."""
         period = 1.0 / self._settings.rate
         if self._kind == "synthetic":
+            drawn: LiveSample | None = None
             while not self._closing.wait(period):
                 sample = self._sample
                 if sample is None:
                     raise CameraError("the mock gives no samples, so there is nothing to draw")
+                if sample is drawn:
+                    continue  # an old posture makes no new picture: the last one grows old
+                drawn = sample
                 yield picture(self._rig.robot.machine, sample.position, f"tick {sample.tick}")
             return
         if self._kind == "webrtc":

@@ -3,8 +3,8 @@
 import type { QueueStatus, RobotMessage, ServiceEvent } from '../api/types';
 import { timeOfDay } from '../format';
 
-/** A name as the person at this page reads it. */
-type Who = (name: string) => string;
+/** A name as the person at this page reads it; of whoever pressed Stop, `stoppedAt` some time. */
+type Who = (name: string, stoppedAt?: string) => string;
 /** ms by which a stop may come before the pause of the queue that it causes. */
 const CAUSED_WITHIN = 5000;
 
@@ -41,7 +41,7 @@ export function withYou(reason: string, who: Who): string {
 }
 
 const pressed = (event: ServiceEvent, who: Who): string =>
-  `${who(event.actor!)} pressed STOP at ${timeOfDay(event.at)}`;
+  `${who(event.actor!, event.at)} pressed STOP at ${timeOfDay(event.at)}`;
 
 /** Beginning of the cause of a stop by the service itself, which does not know there for which of two reasons. */
 const BY_SERVICE = 'by the service: the experiment was cancelled';

@@ -83,8 +83,12 @@ class Live {
   jobs = $state.raw<ReadonlyMap<string, Job>>(new Map());
   /** What happened, the newest first. */
   events = $state.raw<readonly ServiceEvent[]>([]);
-  robot: RobotMessage | null = $derived(withStopper(this.toldRobot, this.events, (name) => this.who(name)));
-  queue: QueueStatus | null = $derived(withPauser(this.toldQueue, this.events, (name) => this.who(name)));
+  robot: RobotMessage | null = $derived(
+    withStopper(this.toldRobot, this.events, (name, at) => this.who(name, at)),
+  );
+  queue: QueueStatus | null = $derived(
+    withPauser(this.toldQueue, this.events, (name, at) => this.who(name, at)),
+  );
   /** Lines for whoever teaches, the newest last. */
   lines = $state.raw<readonly string[]>([]);
   /** The last refusal of something that was sent over the socket. */
@@ -161,9 +165,11 @@ class Live {
     return this.isOperator && (this.isOwner || this.me?.name === owner);
   }
 
-  /** A name as the person at this page reads it. */
-  who(name: string | null | undefined): string {
-    return name == null ? 'unknown' : name === this.me?.name ? 'you' : spoken(name);
+  /** A name as the person at this page reads it. `stoppedAt`: when that person pressed Stop, which everybody at the
+   * service's computer may have done: of them, only who pressed it here is the reader. */
+  who(name: string | null | undefined, stoppedAt?: string): string {
+    const isHere = name !== 'local' || stoppedAt === undefined || stop.wasPressedAt(stoppedAt);
+    return name == null ? 'unknown' : name === this.me?.name && isHere ? 'you' : spoken(name);
   }
 
   /** Why an experiment ended, as the person at this page reads it. */
@@ -360,7 +366,9 @@ class Live {
     const silence = this.clock.silence(at);
     // With several arms, whoever looks at all of them follows the stop of another one, or of all.
     if (isFleet() && stop.target !== here().robot) return;
-    stop.heard(armNow(this.isOpen && silence !== null && silence < SILENT_AFTER, this.robot), at);
+    // Of an arm that is not connected, the service has nothing to send.
+    const isHeard = this.robot?.connection === 'disconnected' || (silence !== null && silence < SILENT_AFTER);
+    stop.heard(armNow(this.isOpen && isHeard, this.robot), at);
   }
 
   private tick(): void {

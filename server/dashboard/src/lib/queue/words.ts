@@ -9,7 +9,7 @@ type Queue = Pick<QueueStatus, 'paused' | 'reason' | 'running' | 'waiting_for'>;
 export const ACTIVITIES: Readonly<Record<Robot['activity'], string>> = {
   none: '',
   experiment: 'An experiment is running.',
-  jog: 'The arm is being jogged.',
+  jog: 'The arm is under hand control.',
   step: 'The arm is making a step.',
   program: 'A taught program is running.',
   lead: 'The arm is led by hand: hold it.',
@@ -48,10 +48,12 @@ export interface Home {
 export function homeOf(robot: Robot | null, queue: Queue | null): Home {
   if (robot === null) return { screen: 'unknown', title: 'Not known' };
   if (robot.connection === 'connecting') return { screen: 'connecting', title: 'Connecting' };
+  if (robot.connection === 'lost') return { screen: 'disconnected', title: 'The link is lost' };
   if (robot.connection !== 'connected') return { screen: 'disconnected', title: 'No arm is connected' };
   if (robot.arm === 'fault') return { screen: 'fault', title: 'Fault' };
   if (robot.arm === 'stopped') return { screen: 'stopped', title: 'Stopped' };
-  if (robot.activity !== 'none') return { screen: 'running', title: 'Moving' };
+  if (robot.activity !== 'none')
+    return { screen: 'running', title: robot.activity === 'jog' ? 'By hand' : 'Moving' };
   if (queue?.paused) return { screen: 'paused', title: 'The queue is paused' };
   return queue?.waiting_for ? { screen: 'waiting', title: 'Waiting' } : { screen: 'ready', title: 'Ready' };
 }
