@@ -1,7 +1,7 @@
 /** Whether the tour is shown: invited by the address (`#/live?tour`), or at the first start. */
 
 import { live } from '../live/live.svelte';
-import { linkTo, router } from '../router.svelte';
+import { router } from '../router.svelte';
 import { isWelcome } from './tour';
 
 const KEY = 'ma2000-tour';
@@ -25,8 +25,7 @@ class TourVisit {
   leave(): void {
     this.isShown = false;
     if (!router.route.query.has('tour')) return;
-    history.replaceState(null, '', linkTo('live'));
-    router.read();
+    router.replace('live');
   }
 }
 
