@@ -58,12 +58,16 @@ def _said(made: Replay, joint: int) -> tuple[str, Literal["good", "warning"]]:
 
 def replay_table(made: Sequence[tuple[str, Replay]]) -> Table:
     """A row a joint and kind of traces: root mean square of recorded − replayed, before and after."""
-    rows = []
-    for kind, one in made:
-        for place, joint in enumerate(one.joints):
-            factor, unit = shown_unit(one.units[place])
-            texts = column([factor * float(one.before[place]), factor * float(one.after[place])])
-            rows.append((Cell(kind), *cells(str(joint), *(with_unit(text, unit) for text in texts))))
+    sizes: dict[str, list[float]] = {}
+    for _, one in made:
+        for name, *pair in zip(one.units, one.before, one.after, strict=True):
+            sizes.setdefault(name, []).extend(shown_unit(name)[0] * float(value) for value in pair)
+    texts = {name: iter(column(values)) for name, values in sizes.items()}
+    rows = [
+        (Cell(kind), *cells(str(joint), *(with_unit(next(texts[name]), shown_unit(name)[1]) for _ in ("before", "after"))))
+        for kind, one in made
+        for joint, name in zip(one.joints, one.units, strict=True)
+    ]
     caption = "Root mean square of recorded − replayed position."
     lost = [effect_on(use.name, use.joints) for use in made[-1][1].left_out]
     caption += f" {capitalised('; '.join(lost))}: not in MJCF." if lost else ""
