@@ -306,6 +306,17 @@ def test_an_experiment_that_has_ended_is_run_again_by_way_of_the_form(dashboard:
     assert service.end_of(again["id"])["state"] == "done"
 
 
+def test_on_a_phone_what_is_pressed_in_the_queue_stays_in_its_place(dashboard: Dashboard, form: Page) -> None:
+    form.set_viewport_size({"width": 360, "height": 740})
+    form.get_by_role("button", name="Pause").click()
+    resume = form.get_by_role("button", name="Resume")
+    expect(resume).to_be_visible()
+    add, below = (one.bounding_box() for one in (form.get_by_role("form", name="New experiment"), resume))
+    assert add is not None
+    assert below is not None
+    assert add["y"] < below["y"]
+
+
 def test_a_run_that_ended_on_live_is_what_the_form_is_filled_with(dashboard: Dashboard) -> None:
     page = dashboard.until_live()
     ramp = {"kind": "ramp", "amplitude": 0.05, "duration": 1.25}
