@@ -61,13 +61,14 @@ def replay_table(made: Sequence[tuple[str, Replay]]) -> Table:
     sizes: dict[str, list[float]] = {}
     for _, one in made:
         for name, *pair in zip(one.units, one.before, one.after, strict=True):
-            sizes.setdefault(name, []).extend(shown_unit(name)[0] * float(value) for value in pair)
-    texts = {name: iter(column(values)) for name, values in sizes.items()}
-    rows = [
-        (Cell(kind), *cells(str(joint), *(with_unit(next(texts[name]), shown_unit(name)[1]) for _ in ("before", "after"))))
-        for kind, one in made
-        for joint, name in zip(one.joints, one.units, strict=True)
-    ]
+            factor, unit = shown_unit(name)
+            sizes.setdefault(unit, []).extend(factor * float(value) for value in pair)
+    texts = {unit: iter([with_unit(text, unit) for text in column(values)]) for unit, values in sizes.items()}
+    rows = []
+    for kind, one in made:
+        for joint, name in zip(one.joints, one.units, strict=True):
+            _, unit = shown_unit(name)
+            rows.append((Cell(kind), *cells(str(joint), next(texts[unit]), next(texts[unit]))))
     caption = "Root mean square of recorded − replayed position."
     lost = [effect_on(use.name, use.joints) for use in made[-1][1].left_out]
     caption += f" {capitalised('; '.join(lost))}: not in MJCF." if lost else ""
