@@ -11,6 +11,8 @@ from daq.contracts.trace import Floats, Trace
 
 RISE_FROM, RISE_TO = 0.1, 0.9
 """Shares of the step between which rise time is measured, as usual in control."""
+ONE_GO = 0.5
+"""Changes of the set point further apart than this (s) are motions of their own."""
 AT_REST = 0.01
 """Largest change (rad, m) of a position at rest, an assumption: noise, and bending under load."""
 
@@ -33,15 +35,15 @@ def _figures(trace: Trace, joint: int, column: int) -> JointFigureSet:
     set_point = None if trace.set_point is None else trace.set_point[:, column] * scale
     error = None if set_point is None else set_point - position
     drive = None if trace.drive is None else trace.drive[:, column]
-    way = 0.0 if set_point is None else float(set_point[-1] - set_point[0])
+    step = None if set_point is None else _step(trace.time, position, set_point)
     return JointFigureSet(
         joint=joint,
         unit="mm" if prismatic else "°",
         moved=_moved(trace, column),
         start=float(position[0]),
         end=float(position[-1]),
-        overshoot=None if set_point is None or way == 0 else _overshoot(position, float(set_point[-1]), way),
-        rise_time=None if way == 0 else _rise_time(trace.time, position, way),
+        overshoot=None if set_point is None or step is None else _overshoot(position, float(set_point[-1]), step[1]),
+        rise_time=None if step is None else _rise_time(trace.time, position, *step),
         largest_error=None if error is None else float(np.abs(error).max()),
         final_error=None if error is None else float(error[-1]),
         largest_drive=None if drive is None else float(np.abs(drive).max()),
@@ -54,12 +56,22 @@ def _moved(trace: Trace, column: int) -> bool:
     return bool(np.ptp(trace.position[:, column]) > AT_REST)
 
 
+def _step(time: Floats, position: Floats, set_point: Floats) -> tuple[float, float] | None:
+    """Returns where the position rests before the set point changes, and the way of the set point; None unless it goes
+    one way in one go."""
+    change = np.diff(set_point)
+    at = np.flatnonzero(change)
+    if not len(at) or np.ptp(np.sign(change[at])) or (np.diff(time[at + 1]) > ONE_GO).any():
+        return None
+    return float(position[: at[0] + 1].mean()), float(set_point[-1] - set_point[0])
+
+
 def _overshoot(position: Floats, target: float, way: float) -> float:
     return max(0.0, float(((position - target) * math.copysign(1.0, way)).max()))
 
 
-def _rise_time(time: Floats, position: Floats, way: float) -> float | None:
-    share = (position - position[0]) / way
+def _rise_time(time: Floats, position: Floats, start: float, way: float) -> float | None:
+    share = (position - start) / way
     reached = [np.flatnonzero(share >= level) for level in (RISE_FROM, RISE_TO)]
     if not all(len(found) for found in reached):
         return None

@@ -41,4 +41,5 @@ def headline(found: StatusReport) -> str:
     kind = "mock" if found.identity.simulated else "REAL ARM"
     tick = "" if found.sample is None else f", tick {found.sample.tick}, {found.sample.age * 1e3:.0f} ms old"
     cause = f" ({found.cause})" if found.cause else ""
-    return f"{kind}{tick}, {found.arm}{cause}; {found.activity}; link {found.link.state}"
+    activity = "" if found.activity == "none" else f"; {found.activity}"
+    return f"{kind}{tick}, {found.arm}{cause}{activity}; link {found.link.state}"

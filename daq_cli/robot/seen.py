@@ -21,16 +21,17 @@ def print_figures(trace: Trace) -> None:
     table = Table(box=None, header_style="bold")
     for title in HEADS:
         table.add_column(title, justify="right")
-    for one in joint_figures(trace):
-        if not one.moved:
-            continue
+    moved = [one for one in joint_figures(trace) if one.moved]
+    for one in moved:
         rise = "–" if one.rise_time is None else f"{one.rise_time:.2f} s"
         drive = "–" if one.largest_drive is None else f"{one.largest_drive:.1f} {trace.drive_unit}"
         ends = (_angle(value, one.unit) for value in (one.start, one.end, one.overshoot))
         errors = (_angle(value, one.unit) for value in (one.largest_error, one.final_error))
         table.add_row(str(one.joint), *ends, rise, *errors, drive)
-    if table.row_count:
+    if moved:
         print_table(table)
+    if any(one.overshoot is None for one in moved):
+        print("Overshoot and rise time are given for a single monotonic change of the set point only.")
 
 
 def _angle(value: float | None, unit: str) -> str:

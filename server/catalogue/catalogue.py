@@ -163,7 +163,8 @@ class Catalogue:
     def _insert(self, path: Path, summary: TraceSummary) -> bool:
         assert summary.trace_id is not None
         moved = summary.moved
-        if moved is None:  # no experiment says it; samples that cannot be read say so when the trace is opened
+        # No whole experiment says it. Samples that cannot be read say so when the trace is opened.
+        if moved is None or summary.outcome != "complete":
             with suppress(TraceError):
                 moved = joints_moved(read_trace(path, self.limits))
         try:

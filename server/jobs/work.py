@@ -20,7 +20,7 @@ from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from daq.contracts.trace import Trace
+    from daq.contracts.trace import Trace, TraceRecord
     from model.blocks import Report
     from model.comparison.compare import Comparison
     from model.machine_model.model import Model
@@ -222,8 +222,8 @@ class _Worker:
             lambda pair, of, held_out: self._compared(pair, of, held_out, DIAGNOSIS_SHARE, MAP_SHARE),
             lambda: self.mailbox.report(MAP_SHARE, "locating where the model as given disagrees", at_once=True),
         )
-        files = {trace.record.trace_id: trace.file for trace in every if trace.file}
-        page = saved_report(data, files, report_sections(found, every))
+        names = {trace.record.trace_id: _label(trace.record) for trace in every}
+        page = saved_report(data, names, report_sections(found, every))
         model = found.model_after if changed else None
         named = {one.effect for step in found.steps if step.adopted for one in step.group or (step,) if one.effect}
         done = self._done(DiagnosisJobResult(id=self._job, data=data), page, headline(found), model)
@@ -290,3 +290,9 @@ class _Worker:
     @property
     def _job(self) -> str:
         return self.mailbox.folder.name
+
+
+def _label(record: TraceRecord) -> str:
+    """What the page calls a trace, by the service's clock."""
+    name = record.trace_id if record.spec is None else record.spec.name or record.spec.trajectory.kind.replace("_", " ")
+    return f"{name}, {record.created.astimezone():%d %b %Y, %H:%M:%S}"

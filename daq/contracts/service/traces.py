@@ -25,7 +25,7 @@ class CatalogueEntry(Wire):
     name: str | None
     joints: tuple[int, ...]
     moved: tuple[int, ...] = ()
-    """Joints that the experiment moves; of other traces, those that moved."""
+    """Joints that the whole experiment moves; of other traces, those that moved."""
     outcome: Outcome | None
     samples: int | None
     duration: float | None
@@ -46,7 +46,7 @@ class JointFigureSet(FrozenRecord):
     trace's unit.
 
     `overshoot`: how far the joint went beyond the last set point, in the direction of the motion. `rise_time`: time of
-    the position from 10 to 90 % of the motion. Both are None without set points or motion.
+    the position from 10 to 90 % of the change of the set point. Both are None unless it changes one way in one go.
     """
 
     joint: int

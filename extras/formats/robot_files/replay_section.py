@@ -58,12 +58,17 @@ def _said(made: Replay, joint: int) -> tuple[str, Literal["good", "warning"]]:
 
 def replay_table(made: Sequence[tuple[str, Replay]]) -> Table:
     """A row a joint and kind of traces: root mean square of recorded − replayed, before and after."""
+    sizes: dict[str, list[float]] = {}
+    for _, one in made:
+        for name, *pair in zip(one.units, one.before, one.after, strict=True):
+            factor, unit = shown_unit(name)
+            sizes.setdefault(unit, []).extend(factor * float(value) for value in pair)
+    texts = {unit: iter([with_unit(text, unit) for text in column(values)]) for unit, values in sizes.items()}
     rows = []
     for kind, one in made:
-        for place, joint in enumerate(one.joints):
-            factor, unit = shown_unit(one.units[place])
-            texts = column([factor * float(one.before[place]), factor * float(one.after[place])])
-            rows.append((Cell(kind), *cells(str(joint), *(with_unit(text, unit) for text in texts))))
+        for joint, name in zip(one.joints, one.units, strict=True):
+            _, unit = shown_unit(name)
+            rows.append((Cell(kind), *cells(str(joint), next(texts[unit]), next(texts[unit]))))
     caption = "Root mean square of recorded − replayed position."
     lost = [effect_on(use.name, use.joints) for use in made[-1][1].left_out]
     caption += f" {capitalised('; '.join(lost))}: not in MJCF." if lost else ""

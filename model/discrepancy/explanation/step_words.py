@@ -78,7 +78,8 @@ def reason_text(step: Step, machine: Machine) -> str:
     place = f"{joints_in_words(step.joints)}: " if step.joints else ""
     sizes = (_size(v, several=len(step.joints) > 1, sliding=sliding) for v in step.parameters.values())
     seen = f"{place}{shape_of(step.effect or '', sliding=sliding)} ({', '.join(sizes)})"
-    taken = "" if reason.removed is None else _removed(reason.removed)
+    # Where it is told beyond noise, no second share stands beside it.
+    taken = "" if reason.removed is None or step.excess_removed_holdout is not None else _removed(reason.removed)
     return sentence(f"{seen}{taken}")
 
 
@@ -107,7 +108,7 @@ def _size(value: FoundValue, *, several: bool, sliding: bool) -> str:
 
 def _removed(share: float) -> str:
     square = "the mean square error on records not fitted to"
-    return f"; {square} grows by {-share:.0%}" if share < 0.0 else f"; it takes {percent_gone(share, 0)} off {square}"
+    return f"; {square} grows by {-share:.0%}" if share < 0.0 else f"; it takes {percent_gone(share)} off {square}"
 
 
 def refusal_words(refusal: Refusal) -> str:
@@ -125,11 +126,11 @@ def removed_words(share: float) -> str:
     floor. A clause."""
     if share < 0:
         return f"the held-out variance beyond noise has grown by {-100 * share:.1f} %"
-    return f"{percent_gone(share, 1)} of the held-out variance beyond noise is gone"
+    return f"{percent_gone(share)} of the held-out variance beyond noise is gone"
 
 
-def percent_gone(share: float, places: int) -> str:
+def percent_gone(share: float) -> str:
     """A share in percent; “all” for all of it. A share below all is never rounded up to 100 %."""
     if share >= 1.0:
         return "all"
-    return f"{min(100 * share, 100 - 10**-places):.{places}f} %".replace("-", "−")
+    return f"{min(100 * share, 99.9):.1f} %".replace("-", "−")

@@ -67,6 +67,19 @@ def test_a_joint_that_is_held_or_never_gets_there_has_no_rise_time() -> None:
     assert found.moved
     assert (found.overshoot, found.rise_time, found.largest_error, found.final_error) == (None,) * 4
     assert not figures([10, 10, 10], None).moved
+
+
+def test_overshoot_and_rise_time_are_of_one_motion_one_way_from_the_rest_before_it() -> None:
+    there = [10, 20, 20]
+    for interrupted in ([*there, 15], [*there, *[20] * 5, 25]):
+        found = figures([float(value) for value in interrupted], [float(value) for value in interrupted])
+        assert found.moved
+        assert (found.overshoot, found.rise_time) == (None, None)
+    noisy = figures([10.5, 9.5, 11.2, 15, 19.1, 20], [10, 10, 20, 20, 20, 20])
+    assert noisy.rise_time == pytest.approx(0.2), "not from the first reading"
+
+
+def test_a_trace_without_samples_has_no_figures() -> None:
     empty = Trace(record(), (1,), np.zeros(0), np.zeros((0, 1)))
     assert joint_figures(empty) == []
 

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
+import numpy as np
 import pytest
 from mcap.writer import Writer
 
 from daq.contracts.service.traces import TraceChange
+from daq.contracts.trace import Trace
 from daq.traces.catalogue import summary_of
 from daq.traces.csv_table import import_csv
 from daq.traces.naming import trace_path
@@ -22,6 +24,7 @@ from server.problems import ProblemError
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.traces import TraceStore
+from tests.daq.traces.samples import record
 from tests.server.meanwhile import Meanwhile, raising
 
 ROBOT = "ma2000"
@@ -59,6 +62,18 @@ def shelf(tmp_path: Path, store: Store) -> Shelf:
     assert catalogue.add(path) == trace.record.trace_id
     traces.change(ROBOT, trace.record.trace_id, TraceChange(tags=("rig b",), notes="loose belt"))
     return Shelf(catalogue, traces, experiments, trace.record.trace_id, path, copy)
+
+
+@pytest.mark.parametrize(("outcome", "moved"), [("complete", (1, 2, 3)), ("stopped", ())])
+def test_a_run_that_was_stopped_moved_only_the_joints_that_it_began_to_move(
+    shelf: Shelf, outcome: str, moved: tuple[int, ...]
+) -> None:
+    begin = record(outcome=outcome, trace_id="0123456789ab")
+    held = np.ones((20, 3))
+    path = trace_path(shelf.catalogue.folder, begin)
+    write_trace(Trace(begin, (1, 2, 3), 0.02 * np.arange(20), held + 0.001, set_point=held), path)
+    assert shelf.catalogue.add(path) == begin.trace_id
+    assert shelf.traces.get(ROBOT, begin.trace_id).moved == moved
 
 
 @pytest.mark.parametrize("noticed", [False, True])

@@ -87,6 +87,7 @@ def _see_the_story(page: Page, found: dict[str, Any], report: Path) -> None:
     saved.goto(report.as_uri())
     expect(saved.get_by_role("heading", level=1)).to_have_text(re.compile("^Coulomb friction on joint 2, "))
     expect(saved.get_by_role("region", name="How much it shrinks").get_by_role("listitem")).to_have_count(3)
+    expect(saved.locator("main")).to_contain_text(re.compile(r", \d\d \w{3} \d{4}, \d\d:\d\d:\d\d"))
     assert faults_of(saved) == []
     saved.close()
 

@@ -306,6 +306,29 @@ def test_an_experiment_that_has_ended_is_run_again_by_way_of_the_form(dashboard:
     assert service.end_of(again["id"])["state"] == "done"
 
 
+def test_on_a_phone_what_is_pressed_in_the_queue_stays_in_its_place(dashboard: Dashboard, form: Page) -> None:
+    form.set_viewport_size({"width": 360, "height": 740})
+    form.get_by_role("button", name="Pause").click()
+    resume = form.get_by_role("button", name="Resume")
+    expect(resume).to_be_visible()
+    add, below = (one.bounding_box() for one in (form.get_by_role("form", name="New experiment"), resume))
+    assert add is not None
+    assert below is not None
+    assert add["y"] < below["y"]
+
+
+def test_a_run_that_ended_on_live_is_what_the_form_is_filled_with(dashboard: Dashboard) -> None:
+    page = dashboard.until_live()
+    ramp = {"kind": "ramp", "amplitude": 0.05, "duration": 1.25}
+    spec = {"name": "slow", "trajectory": ramp, "hold": 0.1}
+    dashboard.service.end_of(dashboard.service.robot.post("/experiments", json={"spec": spec}).json()["id"])
+    page.get_by_role("button", name="Edit and run again").click()
+    expect(page.get_by_role("textbox", name="Duration")).to_have_value("1.25")
+    expect(page).to_have_url(re.compile("#/experiments$"))
+    expect(page.get_by_text("motion within its limits")).to_be_visible()
+    expect(page.get_by_label("Name", exact=True)).to_have_value("slow")
+
+
 def test_a_schedule_may_begin_later(dashboard: Dashboard, form: Page) -> None:
     form.get_by_label("Repeatedly").check()
     form.get_by_label("First run").fill("2199-01-02T03:04")

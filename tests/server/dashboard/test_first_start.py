@@ -24,6 +24,11 @@ def test_the_tour_comes_once_blocks_nothing_and_leads_to_the_demonstration(
     browser: Browser, served: tuple[Service, MockControl], dashboard: Dashboard
 ) -> None:
     service, _ = served
+    late = _first(browser, f"{service.url}/#/traces")
+    late.get_by_role("link", name="Live").click()
+    expect(late.get_by_role("region", name="The arm now")).to_be_visible()
+    expect(late.get_by_role("dialog")).to_have_count(0)
+    late.context.close()
     page = _first(browser, service.url)
     tour = page.get_by_role("dialog")
     expect(tour).to_have_accessible_name("This arm is a mock")

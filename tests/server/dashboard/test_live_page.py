@@ -65,6 +65,11 @@ def test_a_run_that_failed_is_told_until_it_was_read(dashboard: Dashboard) -> No
     expect(said).to_be_visible()
     dashboard.open("kiosk")
     expect(said).to_be_visible()
+    page.set_viewport_size({"width": 740, "height": 360})
+    told, stop = (one.bounding_box() for one in (page.locator(".state"), page.get_by_role("button", name="STOP")))
+    assert told is not None
+    assert stop is not None
+    assert told["x"] + told["width"] <= stop["x"]
     page.get_by_role("button", name="Dismiss").click()
     expect(said).not_to_be_attached()
     dashboard.until_live()

@@ -140,6 +140,9 @@ def test_cursors_measure_what_the_service_says_of_the_whole_trace(
     assert area is not None
     page.mouse.click(area["x"] + 0.25 * area["width"], area["y"] + 40)
     expect(page.get_by_role("textbox", name="Cursor A")).to_have_value(re.compile(r"0\.[34]\d\d"))
+    told = _chart(page).locator(".u-legend")
+    expect(told).to_contain_text(re.compile(r"^at[^J]*0\.[34]\d* s.*J1 set point.*J1 position[^J]*\d\.\d\d", re.DOTALL))
+    expect(page.locator(".u-cursor-y")).to_have_count(0)
 
 
 @pytest.mark.timeout(600)

@@ -2,7 +2,7 @@
 
 import uPlot from 'uplot';
 import { placedFlags } from './chart_flags';
-import { significant } from './format';
+import { fixed, NOTHING, significant } from './format';
 import { sparingPath } from './drawing/paths';
 
 export interface ChartSeries {
@@ -60,6 +60,8 @@ export interface ChartDrawing {
   thin: boolean;
   /** Charts of the same key share their cursor and their zoom. */
   sync?: string;
+  /** Whether what lies at the cursor is written below. */
+  readout: boolean;
   zoomable: boolean;
   zoomed: (range: [number, number]) => void;
   cursorAt: (x: number | null) => void;
@@ -111,10 +113,11 @@ export function optionsOf(drawing: ChartDrawing, width: number, height: number):
     width,
     height,
     padding: [isMarked ? FLAGS : 8, drawing.series.some((one) => one.end) ? LEADER + 26 : 10, 0, 0],
-    legend: { show: false },
+    legend: { show: drawing.readout },
     cursor: {
       drag: { x: drawing.zoomable, y: false, setScale: false },
       points: { size: 7 },
+      y: drawing.sync === undefined, // its height means nothing in the other charts
       ...(drawing.sync === undefined ? {} : { sync: { key: drawing.sync } }),
     },
     scales: {
@@ -144,15 +147,15 @@ export function optionsOf(drawing: ChartDrawing, width: number, height: number):
       },
     ],
     series: [
-      {},
+      { label: 'at', value: (_, value) => (value == null ? NOTHING : (axes.x ?? plain)(value)) },
       ...drawing.series.map((one) => ({
         label: one.label,
         stroke: one.colour,
         width: one.points ? 0 : drawing.thin ? 1 : (one.width ?? 1.75),
-        ...(one.points ? {} : { paths: sparingPath }),
+        ...(one.points ? {} : { paths: sparingPath(one.dash) }),
+        value: (_: uPlot, value: number | null) => (value == null ? NOTHING : fixed(value, 2)),
         show: one.show ?? true,
         points: one.points ? { show: true, size: 4, fill: one.colour } : { show: false },
-        ...(one.dash === undefined ? {} : { dash: one.dash }),
       })),
     ],
     hooks: {

@@ -40,6 +40,12 @@ class Router {
     location.hash = `${linkTo(page)}?${new URLSearchParams(query)}`;
   }
 
+  /** Takes the place of the address now. Read afterwards: Svelte would mount a page anew that is read amid effects. */
+  replace(page: string, ...rest: string[]): void {
+    history.replaceState(null, '', linkTo(page, ...rest));
+    queueMicrotask(() => this.read());
+  }
+
   go(page: string, ...rest: string[]): void {
     location.hash = linkTo(page, ...rest);
   }

@@ -36,7 +36,7 @@ def test_a_reason_in_torques_says_what_cycles_are_counted_in() -> None:
     }
     turning = torque_reason("revolute", values)
     assert turning.startswith("Joint 1: the torque goes up and down with the angle, ")
-    assert "at a fixed number of cycles per turn (sine −5.12 N, cycles 200 a turn); it takes 99 % off" in turning
+    assert "at a fixed number of cycles per turn (sine −5.12 N, cycles 200 a turn); it takes 99.0 % off" in turning
     sliding = torque_reason("prismatic", values)
     assert sliding.startswith("Joint 1: the force goes up and down with the position, ")
     assert "at a fixed number of cycles per metre (sine −5.12 N, cycles 200 rad/m, 31.8 a metre); it takes" in sliding

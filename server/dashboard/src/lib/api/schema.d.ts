@@ -3820,7 +3820,7 @@ export interface components {
          *     trace's unit.
          *
          *     `overshoot`: how far the joint went beyond the last set point, in the direction of the motion. `rise_time`: time of
-         *     the position from 10 to 90 % of the motion. Both are None without set points or motion.
+         *     the position from 10 to 90 % of the change of the set point. Both are None unless it changes one way in one go.
          */
         JointFigureSet: {
             /** Joint */

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { DiagnosisData } from '../api/types';
-import { gapOf, goneOf, ticksFromZero } from './gap';
+import { gapOf, goneOf, goneText, ticksFromZero } from './gap';
 
 const gap = {
   measure: 'closed-loop',
@@ -61,6 +61,7 @@ describe('the gap, step by step', () => {
     expect(goneOf(1, 0.1, 0.1)).toBeCloseTo(1);
     expect(goneOf(1, 1, 0.1)).toBe(0);
     expect(goneOf(0.12, 0.1, 0.1)).toBeNull();
+    expect([0.5, 0.9996, 1.01].map(goneText)).toEqual(['50.0 %', '99.9 %', 'all']);
   });
 
   it('has an axis from 0, so that the height of the noise floor can be compared', () => {

@@ -1,6 +1,7 @@
 /** How the gap between measurement and simulation shrinks, step by step, against the noise floor. */
 
 import type { DiagnosisData } from '../api/types';
+import { fixed } from '../format';
 import { parameterName } from '../models/parameters';
 
 export interface Stage {
@@ -61,6 +62,11 @@ function labelOf(kinds: readonly string[], place: number): string {
 export function goneOf(before: number, after: number, floor: number): number | null {
   if (before < 1.5 * floor) return null;
   return (before ** 2 - after ** 2) / (before ** 2 - floor ** 2);
+}
+
+/** Such a share in percent, as the service writes it: “all” for all of it, never rounded up to 100 %. */
+export function goneText(share: number): string {
+  return share >= 1 ? 'all' : `${fixed(Math.min(100 * share, 99.9), 1)} %`;
 }
 
 /** Round values from 0 to beyond the largest of these: the ticks of an axis, the last one its end. */

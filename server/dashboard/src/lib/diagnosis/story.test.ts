@@ -1,9 +1,10 @@
 import { describe, expect, it } from 'vitest';
-import type { DiagnosisStep, TriedEffect } from '../api/types';
+import type { DiagnosisStep, Overlay, TriedEffect } from '../api/types';
 import {
   answeredJoints,
   besideAnswer,
   closedWords,
+  closesGap,
   heatOverTime,
   scenesOf,
   shareText,
@@ -64,6 +65,14 @@ it('with the answer the joints that are still red at times are named', () => {
   });
   expect(closedWords(scene(0.9))).toContain('no joint is red any more');
   expect(closedWords(scene(4))).toContain('joint 2 is still red at times');
+});
+
+it('an answer closes the gap where it adopted something, and not because there are two simulations', () => {
+  const found = (adopted: boolean) => ({
+    steps: [{ adopted }] as DiagnosisStep[],
+    signals: [{ residual: [[], []] }] as unknown as Overlay[],
+  });
+  expect([found(true), found(false), null].map(closesGap)).toEqual([true, false, false]);
 });
 
 it('the error shrinks on held-out traces where there are any, in degrees', () => {

@@ -176,6 +176,11 @@ export function closedWords(scene: Pick<Scene, 'drift' | 'noise'>): string {
   return `With the effect in the model the arms move nearly alike: ${joints} still red at times.`;
 }
 
+/** Whether an answer changed the model: without a name it closes no gap. */
+export function closesGap(found: Pick<DiagnosisData, 'steps' | 'signals'> | null): boolean {
+  return (found?.signals[0]?.residual.length ?? 0) > 1 && found!.steps.some((one) => one.adopted);
+}
+
 /** The joints that an answer names; none where nothing was adopted. */
 export function answeredJoints(found: Pick<DiagnosisData, 'steps'>): number[] {
   const adopted = found.steps.filter((one) => one.adopted);

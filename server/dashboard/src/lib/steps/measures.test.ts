@@ -117,6 +117,13 @@ describe('rise time', () => {
     const found = measureStep({ time, position: behind, setPoint: ramp }, 0, 8)!;
     expect(found.riseTime).toBeCloseTo(1.6, 2);
   });
+
+  it('is counted from the rest before the motion, not from the reading at a cursor', () => {
+    const ramp = time.map((moment) => Math.min(10, Math.max(0, 5 * (moment - 1))));
+    const noisy = ramp.map((value, index) => value + (index < 1000 ? 0.5 * (-1) ** index : 0));
+    const found = [0.5, 0.501].map((from) => measureStep({ time, position: noisy, setPoint: ramp }, from, 8));
+    expect(found.map((one) => one!.riseTime!.toFixed(2))).toEqual(['1.60', '1.60']);
+  });
 });
 
 describe('samples around a moment', () => {

@@ -1,7 +1,7 @@
 /**
  * What a response between two cursors tells: rise time, overshoot, settling time, as they are defined in control
- * engineering and as the service computes them for a whole trace: of the way of the set point, from where the window
- * begins.
+ * engineering and as the service computes them for a whole trace: of the way of the set point, from where the position
+ * rests before it.
  */
 
 /** Rise time is counted between these shares of the way. */
@@ -27,6 +27,7 @@ export const ONE_GO = 0.5;
 export interface StepMeasures {
   readonly begin: number;
   readonly end: number;
+  /** Where the position rests before the motion begins. */
   readonly initial: number;
   /** The last set point of the window, or where the position ends when there is none. */
   readonly target: number;
@@ -50,7 +51,7 @@ export function measureStep(response: Response, from: number, to: number): StepM
   const end = indexAfter(response.time, Math.max(from, to));
   if (end - first < 3) return null;
   const { time, position, setPoint } = response;
-  const initial = position[first]!;
+  const initial = meanOf(position, first, Math.max(first + 1, motionBegin(setPoint, first, end)));
   const target = setPoint
     ? setPoint[end - 1]!
     : meanOf(position, end - Math.max(1, Math.round((end - first) * TAIL)), end);

@@ -36,7 +36,7 @@ export const STOPS: readonly Stop[] = [
 ];
 
 export interface Visit {
-  /** Whether it was shown in this browser before. */
+  /** Whether it was shown in this browser before, or might have been on this visit. */
   wasSeen: boolean;
   isMock: boolean;
   page: string;

@@ -1,6 +1,6 @@
 import { expect, it } from 'vitest';
 import type { Machine, TraceDetails } from '../api';
-import { besideEarlier, limitsOf } from './earlier';
+import { besideEarlier, isSameExperiment, limitsOf } from './earlier';
 
 const figures = (error: number, drive: number): TraceDetails['figures'] =>
   [
@@ -18,6 +18,17 @@ it('tells a run beside earlier ones of the same experiment, and nothing where th
   expect(besideEarlier(figures(9, 34), usual, 'V')).toBe(
     'Outside the range of the 3 earlier runs: J2 largest error 9.00°, was 3.80° to 4.10°.',
   );
+});
+
+it('are compared that are whole and of this service alone', () => {
+  const run = (entry: object = {}): TraceDetails =>
+    ({
+      entry: { experiment: 'e1', outcome: 'complete', ...entry },
+      record: { spec: { name: 'a' }, source: 'mock', robot: 'ma2000' },
+    }) as TraceDetails;
+  expect(isSameExperiment(run(), run({ experiment: 'e2' }))).toBe(true);
+  expect(isSameExperiment(run({ outcome: 'stopped' }), run())).toBe(false);
+  expect(isSameExperiment(run(), run({ experiment: null }))).toBe(false);
 });
 
 it('knows the limits that the machine file has, and no others', () => {

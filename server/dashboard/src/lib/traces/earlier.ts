@@ -1,6 +1,6 @@
 /** How a run's figures stand beside the machine file's limits, and beside earlier runs of the same experiment. Pure. */
 
-import type { Machine, TraceDetails } from '../api';
+import type { CatalogueEntry, Machine, TraceDetails } from '../api';
 import { fixed } from '../format';
 
 type Figures = TraceDetails['figures'];
@@ -28,14 +28,18 @@ export function limitsOf(
   return { error, drive };
 }
 
-/** Whether an earlier trace is a whole run of the same experiment on the same arm. */
+/** Whether a trace is of a whole experiment of this service: an uploaded trace may be of any arm. */
+export function isWholeRun({ experiment, outcome }: CatalogueEntry): boolean {
+  return experiment !== null && outcome === 'complete';
+}
+
+/** Whether two whole runs are of the same experiment on the same arm. */
 export function isSameExperiment(one: TraceDetails, other: TraceDetails): boolean {
   const { spec, source, robot } = one.record;
   return (
-    spec != null &&
+    [one.entry, other.entry].every(isWholeRun) &&
     other.record.source === source &&
     other.record.robot === robot &&
-    other.entry.outcome === 'complete' &&
     JSON.stringify(spec) === JSON.stringify(other.record.spec)
   );
 }

@@ -1,6 +1,6 @@
 /** Two cursors on the time axis, and what lies between them. */
 
-import { measureStep, type StepMeasures } from '../../lib/steps/measures';
+import { measureStep, ONE_GO, type StepMeasures } from '../../lib/steps/measures';
 import { columnOf, type Range } from '../../lib/traces/columns';
 import type { ShownTrace } from './shown_trace.svelte';
 
@@ -26,7 +26,7 @@ export class Cursors {
   place(shown: Range, motions: readonly number[]): void {
     const begin = motions.find((moment) => moment >= shown[0] && moment < shown[1]);
     const span = shown[1] - shown[0];
-    this.a = begin === undefined ? shown[0] + 0.1 * span : Math.max(shown[0], begin - 0.02);
+    this.a = begin === undefined ? shown[0] + 0.1 * span : Math.max(shown[0], begin - ONE_GO);
     this.b = shown[1] - 0.02 * span;
     this.isOn = true;
   }

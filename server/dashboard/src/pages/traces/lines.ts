@@ -80,15 +80,15 @@ function rowsOf(
   dash: number[],
 ): Row[] {
   const colour = colourOf(trace ?? joint);
-  const label = `${trace === null ? '' : `${drawn.name} `}J${joint} ${signal}`;
+  const label = `${trace === null ? '' : `${drawn.name} `}J${joint}`;
   const end = trace === null ? `J${joint}` : String(trace);
   const scale = signal === 'drive' ? 1 : scaleOf(drawn, joint);
   const begin = signal === 'position' ? beginOf(drawn, joint) : 0;
   const column = columnOf(drawn.signals, signal, joint, scale, begin);
   const asked = signal === 'position' ? columnOf(drawn.signals, 'set_point', joint, scale, begin) : null;
   return [
-    ...(asked ? [[{ label: `${label}, set point`, colour, dash, width: 1.1 }, asked] as const] : []),
-    ...(column ? [[{ label, colour, end, width: 1.6 }, column] as const] : []),
+    ...(asked ? [[{ label: `${label} set point`, colour, dash, width: 1.1 }, asked] as const] : []),
+    ...(column ? [[{ label: `${label} ${signal}`, colour, end, width: 1.6 }, column] as const] : []),
   ];
 }
 
