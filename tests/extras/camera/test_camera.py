@@ -5,7 +5,8 @@ import threading
 from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -19,7 +20,9 @@ from daq.contracts.machine import load_machine
 from daq.traces.reader import read_trace
 from daq.traces.verify import verify
 from extras.camera.mjpeg import CameraError, boundary_of, parts
+from extras.camera.part import Camera
 from extras.camera.recorded import SCHEMA, TOPIC
+from extras.camera.settings import CameraSettings
 from extras.camera.synthetic import HEIGHT, WIDTH, picture
 from tests.server.service import running_service
 
@@ -150,3 +153,21 @@ def test_the_synthetic_picture_shows_the_posture() -> None:
     moved = Image.open(io.BytesIO(picture(MACHINE, [0.0, 0.5, 0.0, 0.0, 0.0, 0.0], "a")))
     assert rest.size == (WIDTH, HEIGHT)
     assert np.mean(np.abs(np.asarray(rest, float) - np.asarray(moved, float))) > 1
+
+
+def test_an_old_posture_makes_no_new_picture() -> None:
+    class Looks:
+        """Ends a camera after so many looks at its samples."""
+
+        left = 5
+
+        def wait(self, _seconds: float) -> bool:
+            self.left -= 1
+            return self.left < 0
+
+    place = SimpleNamespace(name="ma2000", url="mock://")
+    robot = SimpleNamespace(place=place, machine=MACHINE, experiment=None)
+    camera: Any = Camera(cast(Any, SimpleNamespace(robot=robot)), CameraSettings())
+    camera.heard(SimpleNamespace(position=[0.0, 1.5, 0.0, 0.0, 0.0, 0.0], tick=7))
+    camera._closing = Looks()
+    assert len(list(camera._source())) == 1

@@ -40,6 +40,13 @@ describe('who stopped the arm or paused the queue', () => {
     );
   });
 
+  it('is not the reader where somebody else at the service’s computer pressed Stop', () => {
+    const other = (name: string, stoppedAt?: string): string => (stoppedAt ? 'somebody' : you(name));
+    expect(withStopper(stopped, [event('stop', NOON)], other)?.cause).toBe(
+      `somebody pressed STOP at ${timeOfDay(NOON)}`,
+    );
+  });
+
   it('is who cancelled the experiment, where the service ended it', () => {
     const cause = 'by the service: the experiment was cancelled, or nobody had the control any more';
     const text = "cancelled: cancelled by somebody at the service's computer";
