@@ -40,6 +40,8 @@ ANSWER_WITHIN = 5.0
 """Time (s) to wait for the answer to an order that moves nothing."""
 ORDERS_AT_ONCE = 8
 """Most quick orders that wait for answers, so that a silent robot blocks no more of the service's threads."""
+DISCONNECTED = "somebody disconnected it"
+"""Why a connection has ended that was asked to."""
 PROGRAM = (sys.executable, "-m", "server.owner")
 log = logging.getLogger("server.robot")
 T = TypeVar("T")
@@ -90,6 +92,7 @@ class Robot:
         self.room_for_orders = threading.BoundedSemaphore(ORDERS_AT_ONCE)
         self._lock = threading.RLock()
         self._owner: OwnerProcess | None = None
+        self._is_asked_to_end = False
         self._opened: Future[RobotIdentity] | None = None
         self._identity: RobotIdentity | None = None
         self.problem = ""
@@ -170,7 +173,7 @@ class Robot:
     def disconnect(self, patience: float = 4.0) -> bool:
         """Frees the port, after a stop of running work. Returns whether this is done within `patience` s."""
         with self._lock:  # a connection attempt may be starting its process
-            owner = self._owner
+            owner, self._is_asked_to_end = self._owner, True
         return True if owner is None else owner.close(patience)
 
     def ask(self, kind: Callable[..., Any], **fields: object) -> Future[Answer]:
@@ -200,7 +203,7 @@ class Robot:
 
     def _begin(self) -> None:
         place = self.place
-        self.problem = ""
+        self.problem, self._is_asked_to_end = "", False
         self._opened = Future()
         opening = Open(
             url=place.url,
@@ -254,8 +257,9 @@ class Robot:
     def _on_end(self, why: str) -> None:
         with self._lock:
             was = self._identity is not None
+            why = DISCONNECTED if self._is_asked_to_end else why
             self._owner = self._identity = self.arm_seen = self.sample = None
-            if was and not self.problem:
+            if was and not self.problem and not self._is_asked_to_end:
                 self.problem = f"the connection has ended ({why})"
             if self._opened is not None and not self._opened.done():
                 self._opened.set_exception(ReachError(self.problem or f"the robot's process ended: {why}"))

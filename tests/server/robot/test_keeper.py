@@ -105,6 +105,10 @@ def test_who_connects_after_a_lost_link_gets_a_new_process() -> None:
     assert robot.connection == "lost"
     keeper.connect()
     assert (robot.connection, [one.closed for one in Owners.made]) == ("connected", [True, False])
+    whys: list[str] = []
+    robot.disconnected.append(whys.append)
+    keeper.disconnect()
+    assert (robot.problem, whys) == ("", ["somebody disconnected it"]), "who asks for an end has no problem"
 
 
 def _refused(connect: Callable[[], None]) -> None:
