@@ -169,7 +169,7 @@ def _reset(robot: OwnedRobot, order: Reset) -> str:
     warning = limp_warning(robot.read_gains())
     holds = "the arm takes set points again" if warning else "the arm holds its posture and takes set points again"
     return (
-        f"released: {holds}"
+        f"reset: {holds}"
         + ("; the set points are the posture measured now" if here else "")
         + f". {warning}" * bool(warning)
     )

@@ -116,6 +116,13 @@ class Live {
   private bannerCause = $derived(
     this.robot?.arm === 'stopped' || this.robot?.arm === 'fault' ? this.robot.cause : '',
   );
+  /** Whether an order may move the arm: it is there, and neither stopped nor at fault. */
+  canMove: boolean = $derived(
+    this.isOpen &&
+      this.robot?.connection === 'connected' &&
+      this.robot.arm !== 'stopped' &&
+      this.robot.arm !== 'fault',
+  );
   isOperator: boolean = $derived(this.me !== null && this.me.role !== 'viewer');
   /** Whether the caller may change what others have submitted to this robot. */
   isOwner: boolean = $derived(this.me?.owner_of.includes(here().robot) ?? false);
