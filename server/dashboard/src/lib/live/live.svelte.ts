@@ -108,9 +108,11 @@ class Live {
   isMissing: boolean = $derived(isMissing(this.socket, this.silence !== null));
   /** Whether what is shown is not what is: no connection, or no samples although the robot is connected. */
   isStale: boolean = $derived(!this.isOpen || this.sampleAge === null || this.sampleAge > STALE_AFTER);
-  /** What the banner says of the arm: why it was stopped, or is at fault. */
+  /** What the banner says of the arm: why it was stopped, or is at fault. A lost link is told with every run it ended. */
   private bannerCause = $derived(
-    this.robot?.arm === 'stopped' || this.robot?.arm === 'fault' ? this.robot.cause : '',
+    this.robot?.connection === 'connected' && (this.robot.arm === 'stopped' || this.robot.arm === 'fault')
+      ? this.robot.cause
+      : '',
   );
   isOperator: boolean = $derived(this.me !== null && this.me.role !== 'viewer');
   /** Whether the caller may change what others have submitted to this robot. */
@@ -307,6 +309,7 @@ class Live {
         break;
       case 'queue':
         this.toldQueue = message.status;
+        if (!message.status.paused) stop.isReset = false;
         if (message.status.running === null) this.progress = null;
         break;
       case 'progress':
@@ -360,7 +363,9 @@ class Live {
     const silence = this.clock.silence(at);
     // With several arms, whoever looks at all of them follows the stop of another one, or of all.
     if (isFleet() && stop.target !== here().robot) return;
-    stop.heard(armNow(this.isOpen && silence !== null && silence < SILENT_AFTER, this.robot), at);
+    // Without samples the service says nothing until the socket asks it: only an answer that is missing is a silence.
+    const isSilent = this.robot?.connection === 'connected' && (silence === null || silence >= SILENT_AFTER);
+    stop.heard(armNow(this.isOpen && !isSilent, this.robot), at);
   }
 
   private tick(): void {
