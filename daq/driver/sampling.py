@@ -131,7 +131,7 @@ class Deliveries:
             self.watch.forget()
             raise ControllerRestartedError(
                 "the controller has restarted (a dip of its supply?): its set points and gains are those of power-up; "
-                "check the arm, then connect again"
+                "look at the arm, then reset it"
             )
 
     def deliver(

@@ -125,7 +125,7 @@ class OwnedRobot:
         counters = self.controller.counters.numbers() if self._due() else (self._told.counters if self._told else {})
         return ArmReport(
             arm="stopped" if stopping else arm.state.value,
-            cause=arm.cause or ended or "",
+            cause="; ".join(part for part in (arm.cause or ended, self.control.unconfirmed) if part),
             activity=self.activity,
             limp=tuple(limp_joints(self.gains)),
             link=self.controller.link.state.value,

@@ -40,6 +40,8 @@ class ArmControl:
         self._frozen = False
         self.freezes = 0
         """Number of stops that were sent and answered, or given up."""
+        self.unconfirmed = ""
+        """What became of the newest stop, if the board has not confirmed it; a reset ends it."""
         self.handle(Event.CONNECTED)
 
     @property
@@ -102,6 +104,7 @@ class ArmControl:
         confirmation = self._controller.stop()
         self.freezes += 1
         self._frozen = self._frozen or confirmation.acknowledged
+        self.unconfirmed = "" if confirmation.acknowledged else stop_line(confirmation)
         return confirmation
 
     def _release(self, stop: int) -> None:
@@ -110,6 +113,7 @@ class ArmControl:
             # A stop was written while the release was on its way, and the release may have undone it.
             self._controller.stop()
             self.require_not_halted()
+        self.unconfirmed = ""
 
     def require_not_halted(self) -> None:
         """Raises StoppedError if the arm was halted."""

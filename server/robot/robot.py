@@ -40,8 +40,6 @@ ANSWER_WITHIN = 5.0
 """Time (s) to wait for the answer to an order that moves nothing."""
 ORDERS_AT_ONCE = 8
 """Most quick orders that wait for answers, so that a silent robot blocks no more of the service's threads."""
-DISCONNECTED = "somebody disconnected it"
-"""Why a connection has ended that was asked to."""
 PROGRAM = (sys.executable, "-m", "server.owner")
 log = logging.getLogger("server.robot")
 T = TypeVar("T")
@@ -92,7 +90,6 @@ class Robot:
         self.room_for_orders = threading.BoundedSemaphore(ORDERS_AT_ONCE)
         self._lock = threading.RLock()
         self._owner: OwnerProcess | None = None
-        self._is_asked_to_end = False
         self._opened: Future[RobotIdentity] | None = None
         self._identity: RobotIdentity | None = None
         self.problem = ""
@@ -103,6 +100,8 @@ class Robot:
         """The newest sample."""
         self._terminal: Terminal | None = None
         """The pseudo-terminal at which it was reached, if it is a mock's."""
+        self._is_unwanted = False
+        """Whether somebody has asked for the end of the connection."""
 
     @property
     def name(self) -> str:
@@ -173,7 +172,7 @@ class Robot:
     def disconnect(self, patience: float = 4.0) -> bool:
         """Frees the port, after a stop of running work. Returns whether this is done within `patience` s."""
         with self._lock:  # a connection attempt may be starting its process
-            owner, self._is_asked_to_end = self._owner, True
+            owner, self._is_unwanted = self._owner, True
         return True if owner is None else owner.close(patience)
 
     def ask(self, kind: Callable[..., Any], **fields: object) -> Future[Answer]:
@@ -203,7 +202,7 @@ class Robot:
 
     def _begin(self) -> None:
         place = self.place
-        self.problem, self._is_asked_to_end = "", False
+        self.problem, self._is_unwanted = "", False
         self._opened = Future()
         opening = Open(
             url=place.url,
@@ -257,10 +256,11 @@ class Robot:
     def _on_end(self, why: str) -> None:
         with self._lock:
             was = self._identity is not None
-            why = DISCONNECTED if self._is_asked_to_end else why
-            self._owner = self._identity = self.arm_seen = self.sample = None
-            if was and not self.problem and not self._is_asked_to_end:
+            if self._is_unwanted and why == "exit code 0":
+                why = "disconnected on request"
+            elif was and not self.problem:
                 self.problem = f"the connection has ended ({why})"
+            self._owner = self._identity = self.arm_seen = self.sample = None
             if self._opened is not None and not self._opened.done():
                 self._opened.set_exception(ReachError(self.problem or f"the robot's process ended: {why}"))
         _notify_each(self.reached, self.reach())

@@ -188,11 +188,13 @@ def _disconnected(service: Service) -> None:
     assert service.robot.post("/disconnect").status_code == 200
     status = service.status()
     assert (status["connection"], status["arm"], status["sample"]) == ("disconnected", "disconnected", None)
+    assert status["connection_problem"] == "", "it is what somebody wanted"
     answer = service.robot.get("/gains")
     assert (answer.status_code, answer.json()["type"]) == (503, "/api/v1/problems#not-reached")
     assert service.until_connected()["connection"] == "connected"
     queue = service.robot.get("/queue").json()
-    assert (queue["paused"], queue["reason"].partition(": ")[0]) == (True, "the connection to the robot has ended")
+    ended = "the connection to the robot has ended: disconnected on request; look at the arm, then resume the queue"
+    assert (queue["paused"], queue["reason"]) == (True, ended)
     assert service.robot.post("/queue/resume", json={}).status_code == 200
 
 

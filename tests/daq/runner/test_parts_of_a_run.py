@@ -137,6 +137,9 @@ def test_an_error_freezes_first_and_until_it_is_confirmed() -> None:
     with pytest.raises(RuntimeError):
         fail()
     assert written.requests == ["stop", "stop"]
+    assert "NOT CONFIRMED (silence)" in control.unconfirmed
+    control.handle(Event.RESET)
+    assert control.unconfirmed == ""
     # What became of a freeze is the answer to what asked for it
     control, written = make()
     assert control.handle(Event.ARM) is None

@@ -106,7 +106,7 @@ def test_a_joint_moves_while_its_key_is_held_and_the_gripper_closes_for_whoever_
     button = page.get_by_role("button", name="Joint 1 backward while held")
     button.hover()
     page.mouse.down()
-    expect(page.get_by_text("The arm is being jogged.")).to_be_visible()
+    expect(page.get_by_text("It moves while somebody jogs it.")).to_be_visible()
     while abs(dashboard.mock.ask("state")["set_points"][0] - before) < 5:
         page.wait_for_timeout(20)  # lets the page repeat its command; the test's own time limit ends the wait
     page.mouse.up()
@@ -154,7 +154,7 @@ def test_a_joint_is_not_driven_on_when_the_connection_was_lost_while_its_key_was
     page.get_by_role("button", name="Take control").click()
     page.get_by_role("group", name="Jog:").focus()
     page.keyboard.down("ArrowLeft")
-    expect(page.get_by_text("The arm is being jogged.")).to_be_visible()
+    expect(page.get_by_text("It moves while somebody jogs it.")).to_be_visible()
     before = len(connections)
     connections[-1].close()
     while len(connections) == before or len(heard) < 50:

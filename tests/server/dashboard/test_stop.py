@@ -156,6 +156,22 @@ def test_a_reset_ends_the_stop_and_moves_nothing(dashboard: Dashboard) -> None:
     state = dashboard.mock.ask("state")
     assert not state["frozen"]
     assert all(abs(one - other) <= 2 for one, other in zip(before, state["set_points"], strict=True))
+    page.get_by_role("button", name="Resume the queue").click()
+    expect(page.locator("[data-banner=reset]")).not_to_be_attached()
+    dashboard.service.robot.post("/queue/pause", json={})
+    expect(page.get_by_text("The queue is paused")).to_be_visible()
+    expect(page.locator("[data-banner=reset]")).not_to_be_attached()
+
+
+def test_a_stop_that_the_service_could_not_deliver_is_not_told_as_its_silence(dashboard: Dashboard) -> None:
+    page = dashboard.until_live()
+    dashboard.service.robot.post("/disconnect")
+    expect(page.get_by_text("No arm is connected")).to_be_visible()
+    page.keyboard.press("F8")
+    message = page.locator("[data-stop='not-delivered']")
+    expect(message).to_contain_text("No robot is connected")
+    page.wait_for_timeout(4000)  # longer than the service says nothing unasked
+    expect(message).to_contain_text("No robot is connected")
 
 
 def test_a_late_answer_to_a_reset_does_not_hide_a_stop_that_was_pressed_meanwhile(dashboard: Dashboard) -> None:

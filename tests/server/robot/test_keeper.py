@@ -108,7 +108,7 @@ def test_who_connects_after_a_lost_link_gets_a_new_process() -> None:
     whys: list[str] = []
     robot.disconnected.append(whys.append)
     keeper.disconnect()
-    assert (robot.problem, whys) == ("", ["somebody disconnected it"]), "who asks for an end has no problem"
+    assert (robot.problem, whys) == ("", ["disconnected on request"]), "who asks for an end has no problem"
 
 
 def _refused(connect: Callable[[], None]) -> None:

@@ -37,7 +37,7 @@ const CHANGES: Readonly<Record<Scene, Partial<RobotMessage>>> = {
   stopped: { arm: 'stopped', cause: 'on request, by STOP on the page or daq stop' },
   fault: { arm: 'fault', cause: 'joint 2 is 131 counts from its set point; allowed are 127' },
   stale: {},
-  link: { connection: 'lost', connection_problem: 'no answer for 2 s' },
+  link: { connection: 'lost', cause: 'no answer for 2 s' },
   lost: {},
   off: { connection: 'disconnected' },
 };

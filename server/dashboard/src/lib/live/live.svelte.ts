@@ -112,9 +112,11 @@ class Live {
   isMissing: boolean = $derived(isMissing(this.socket, this.silence !== null));
   /** Whether what is shown is not what is: no connection, or no samples although the robot is connected. */
   isStale: boolean = $derived(!this.isOpen || this.sampleAge === null || this.sampleAge > STALE_AFTER);
-  /** What the banner says of the arm: why it was stopped, or is at fault. */
+  /** What the banner says of the arm: why it was stopped, or is at fault. A lost link is told with every run it ended. */
   private bannerCause = $derived(
-    this.robot?.arm === 'stopped' || this.robot?.arm === 'fault' ? this.robot.cause : '',
+    this.robot?.connection === 'connected' && (this.robot.arm === 'stopped' || this.robot.arm === 'fault')
+      ? this.robot.cause
+      : '',
   );
   /** Whether an order may move the arm: it is there, and neither stopped nor at fault. */
   canMove: boolean = $derived(
@@ -320,6 +322,7 @@ class Live {
         break;
       case 'queue':
         this.toldQueue = message.status;
+        if (!message.status.paused) stop.isReset = false;
         if (message.status.running === null) this.progress = null;
         break;
       case 'progress':
@@ -373,9 +376,9 @@ class Live {
     const silence = this.clock.silence(at);
     // With several arms, whoever looks at all of them follows the stop of another one, or of all.
     if (isFleet() && stop.target !== here().robot) return;
-    // Of an arm that is not connected, the service has nothing to send.
-    const isHeard = this.robot?.connection === 'disconnected' || (silence !== null && silence < SILENT_AFTER);
-    stop.heard(armNow(this.isOpen && isHeard, this.robot), at);
+    // Without samples the service says nothing until the socket asks it: only an answer that is missing is a silence.
+    const isSilent = this.robot?.connection === 'connected' && (silence === null || silence >= SILENT_AFTER);
+    stop.heard(armNow(this.isOpen && !isSilent, this.robot), at);
   }
 
   private tick(): void {

@@ -18,6 +18,10 @@ describe('what goes on', () => {
   it('says once that the arm is stopped, and that the queue is paused', () => {
     const found = whatGoesOn({ ...robot, arm: 'stopped' }, { ...paused, reason: 'the arm is stopped' }, 0);
     expect(found).toBe('Nothing moves until the arm is reset.');
+    const reason = 'the stop could NOT BE DELIVERED';
+    expect(whatGoesOn({ ...robot, connection: 'lost', arm: 'fault' }, { ...paused, reason }, 0)).toBe(
+      'The queue is paused. The stop could NOT BE DELIVERED.',
+    );
     expect(whatGoesOn(robot, paused, 0)).toBe('The queue is paused. By anna.');
   });
 
@@ -61,6 +65,7 @@ it('home is one screen, and the arm comes before the queue', () => {
   const screens = [
     homeOf(null, null),
     homeOf({ ...robot, connection: 'disconnected' }, queue),
+    homeOf({ ...robot, connection: 'lost', arm: 'fault' }, queue),
     homeOf(robot, queue),
     homeOf(robot, paused),
     homeOf(robot, held),
@@ -71,6 +76,7 @@ it('home is one screen, and the arm comes before the queue', () => {
   expect(screens).toEqual([
     'unknown',
     'disconnected',
+    'lost',
     'ready',
     'paused',
     'waiting',

@@ -9,7 +9,7 @@ type Queue = Pick<QueueStatus, 'paused' | 'reason' | 'running' | 'waiting_for'>;
 export const ACTIVITIES: Readonly<Record<Robot['activity'], string>> = {
   none: '',
   experiment: 'An experiment is running.',
-  jog: 'The arm is under hand control.',
+  jog: 'It moves while somebody jogs it.',
   step: 'The arm is making a step.',
   program: 'A taught program is running.',
   lead: 'The arm is led by hand: hold it.',
@@ -18,7 +18,7 @@ export const ACTIVITIES: Readonly<Record<Robot['activity'], string>> = {
 /** What goes on, for the line above the charts. `waiting`: experiments in the queue. */
 export function whatGoesOn(robot: Robot | null, queue: Queue | null, waiting: number): string {
   const activity = ACTIVITIES[robot?.activity ?? 'none'];
-  const isHeld = robot?.arm === 'stopped' || robot?.arm === 'fault';
+  const isHeld = robot?.connection === 'connected' && (robot.arm === 'stopped' || robot.arm === 'fault');
   const held = isHeld ? 'Nothing moves until the arm is reset.' : '';
   // Until the reset, the banner says why; the queue waits for the same reason.
   const paused = queue?.paused
@@ -33,6 +33,7 @@ export interface Home {
   /** Which of the screens it is: each has one next step. */
   screen:
     | 'disconnected'
+    | 'lost'
     | 'connecting'
     | 'ready'
     | 'waiting'
@@ -48,12 +49,12 @@ export interface Home {
 export function homeOf(robot: Robot | null, queue: Queue | null): Home {
   if (robot === null) return { screen: 'unknown', title: 'Not known' };
   if (robot.connection === 'connecting') return { screen: 'connecting', title: 'Connecting' };
-  if (robot.connection === 'lost') return { screen: 'disconnected', title: 'The link is lost' };
+  if (robot.connection === 'lost') return { screen: 'lost', title: 'The link is lost' };
   if (robot.connection !== 'connected') return { screen: 'disconnected', title: 'No arm is connected' };
   if (robot.arm === 'fault') return { screen: 'fault', title: 'Fault' };
   if (robot.arm === 'stopped') return { screen: 'stopped', title: 'Stopped' };
-  if (robot.activity !== 'none')
-    return { screen: 'running', title: robot.activity === 'jog' ? 'By hand' : 'Moving' };
+  if (robot.activity === 'jog') return { screen: 'running', title: 'Under hand control' };
+  if (robot.activity !== 'none') return { screen: 'running', title: 'Moving' };
   if (queue?.paused) return { screen: 'paused', title: 'The queue is paused' };
   return queue?.waiting_for ? { screen: 'waiting', title: 'Waiting' } : { screen: 'ready', title: 'Ready' };
 }

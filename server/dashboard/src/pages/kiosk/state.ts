@@ -19,6 +19,7 @@ const LOOKS: Readonly<Record<ReturnType<typeof homeOf>['screen'], Omit<KioskStat
   stopped: { tone: 'warn', sign: '▲' },
   fault: { tone: 'bad', sign: '■' },
   disconnected: { tone: 'quiet', sign: '○' },
+  lost: { tone: 'bad', sign: '■' },
   connecting: { tone: 'quiet', sign: '○' },
   unknown: { tone: 'quiet', sign: '○' },
 };
