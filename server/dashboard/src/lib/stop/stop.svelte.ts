@@ -8,6 +8,8 @@ import { type ArmNow, type Standing, StopStanding } from './standing';
 import { isStopKey, StopCall, type StopState } from './stop';
 import { wordsOf } from './words';
 
+/** Where this tab keeps when Stop was pressed last, ms since 1970. */
+const PRESSED = 'stop-pressed';
 /** ms between a press on this page and the stop that the service tells of. */
 const SAME_PRESS = 5000;
 
@@ -27,8 +29,6 @@ class Stop {
   /** The robot that the last press was for; empty for all. */
   target = '';
   private followed = new StopStanding('none');
-  /** ms since 1970, of the last press on this page. */
-  private pressed = -Infinity;
 
   get isOfAll(): boolean {
     return this.target === '';
@@ -37,7 +37,6 @@ class Stop {
   /** At once, and without a question: for all arms of the service, unless one is named. */
   press(robot = isFleet() ? '' : here().robot): void {
     this.call?.leave();
-    this.pressed = Date.now();
     this.isReset = false;
     this.target = robot;
     const address = robot === '' ? '/fleet/stop' : `/robots/${encodeURIComponent(robot)}/stop`;
@@ -52,13 +51,15 @@ class Stop {
       told: (state) => this.tell(isFleet() && robot !== '' ? named(robot, state) : state),
     });
     this.call.begin();
+    sessionStorage.setItem(PRESSED, String(Date.now())); // after the stop is on its way: storage may refuse
     // After the stop is on its way: a thumb feels that it was pressed. What became of it is said, not felt.
     if ('vibrate' in navigator) navigator.vibrate(80);
   }
 
-  /** Whether a stop that the service has told of at that time is the last press on this page. */
+  /** Whether a stop that the service has told of at that time is the last press on this page, also before it was loaded
+   * anew. */
   wasPressedAt(at: string): boolean {
-    return Math.abs(Date.parse(at) - this.pressed) < SAME_PRESS;
+    return Math.abs(Date.parse(at) - Number(sessionStorage.getItem(PRESSED))) < SAME_PRESS;
   }
 
   /** The message about this press has been read, or a reset has ended it. A newer one is left as it is. */
