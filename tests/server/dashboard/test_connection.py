@@ -17,8 +17,18 @@ def test_a_service_that_cannot_tell_about_itself_is_shown_all_the_same(dashboard
 
 
 def test_a_cable_that_is_pulled_makes_everything_stale_and_heals_when_it_is_plugged_in(dashboard: Dashboard) -> None:
+    # What became of the stop of its run is told by the banner, the queue and the run.
+    spec = {"name": "long", "trajectory": {"kind": "pause", "duration": 120}}
+    number = dashboard.service.robot.post("/experiments", json={"spec": spec}).json()["id"]
     page = dashboard.until_live()
+    dashboard.service.until_recording(number)
     dashboard.mock.ask("disconnect")
+    undelivered = "the stop could NOT BE DELIVERED"
+    expect(page.locator("[data-banner=link]")).to_contain_text(undelivered)
+    now = page.get_by_role("region", name="The arm now")
+    expect(now).to_contain_text(undelivered)
+    expect(now.get_by_role("button", name="Connect")).not_to_be_attached()
+    expect(page.get_by_role("region", name="The run that just ended")).to_contain_text(undelivered)
     banner = page.get_by_role("banner")
     expect(banner.get_by_text(LIVE).or_(dashboard.degraded)).not_to_be_attached()
     expect(page.get_by_text("stale:")).to_be_visible()

@@ -165,6 +165,8 @@ def test_a_reset_ends_the_stop_and_moves_nothing(dashboard: Dashboard) -> None:
 
 def test_a_stop_that_the_service_could_not_deliver_is_not_told_as_its_silence(dashboard: Dashboard) -> None:
     page = dashboard.until_live()
+    told = {"delivered": False, "confirmed": False, "seconds": 0, "detail": "No robot is connected."}
+    page.route("**/robots/*/stop", lambda route: route.fulfill(json=told))
     dashboard.service.robot.post("/disconnect")
     expect(page.get_by_text("No arm is connected")).to_be_visible()
     page.keyboard.press("F8")

@@ -32,9 +32,10 @@ def test_a_stop_while_the_link_is_lost_is_not_said_to_be_confirmed_and_is_there_
             told = httpx.post(f"{door}/api/v1/robots/ma2000/stop", timeout=60).json()
             assert not told["confirmed"]
             assert "emergency stop" in told["text"]
+            until(service.client, "/robots/ma2000", lambda found: "use the emergency stop" in found["cause"])
             assert not mock.control("state")["frozen"]
             mock.control("reconnect")
-            service.until_arm("stopped")
+            assert "emergency stop" not in service.until_arm("stopped")["cause"]
             assert mock.control("state")["frozen"] is True
             refused = service.robot.post("/queue/resume", json={})
             assert refused.json()["type"] == "/api/v1/problems#arm-stopped"
