@@ -31,7 +31,7 @@ def print_figures(trace: Trace) -> None:
     if moved:
         print_table(table)
     if any(one.overshoot is None for one in moved):
-        print("Overshoot and rise time are given for a single monotonic change of the set point only.")
+        print("Overshoot and rise time need one change of the set point, in one direction.")
 
 
 def _angle(value: float | None, unit: str) -> str:
