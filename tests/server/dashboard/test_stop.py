@@ -163,19 +163,6 @@ def test_a_reset_ends_the_stop_and_moves_nothing(dashboard: Dashboard) -> None:
     expect(page.locator("[data-banner=reset]")).not_to_be_attached()
 
 
-def test_a_stop_that_the_service_could_not_deliver_is_not_told_as_its_silence(dashboard: Dashboard) -> None:
-    page = dashboard.until_live()
-    told = {"delivered": False, "confirmed": False, "seconds": 0, "detail": "No robot is connected."}
-    page.route("**/robots/*/stop", lambda route: route.fulfill(json=told))
-    dashboard.service.robot.post("/disconnect")
-    expect(page.get_by_text("No arm is connected")).to_be_visible()
-    page.keyboard.press("F8")
-    message = page.locator("[data-stop='not-delivered']")
-    expect(message).to_contain_text("No robot is connected")
-    page.wait_for_timeout(4000)  # longer than the service says nothing unasked
-    expect(message).to_contain_text("No robot is connected")
-
-
 def test_a_late_answer_to_a_reset_does_not_hide_a_stop_that_was_pressed_meanwhile(dashboard: Dashboard) -> None:
     page = dashboard.until_live()
     page.keyboard.press("F8")
