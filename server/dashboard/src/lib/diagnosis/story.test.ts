@@ -137,7 +137,7 @@ describe('where, once there is an answer for joint 3', () => {
         more[2],
       );
     const explained = sceneWith(before, [none, none]);
-    expect(said(explained, answered)).toContain('Joint 2: explained by the answer too');
+    expect(said(explained, answered)).toContain('Joint 2: no longer red with the answer');
     const left = sceneWith(before, [before[0]!, none]);
     const partly = 'Joint 2: the answer explains it only in part, and nothing else was named.';
     expect(said(left, answered)).toBe(partly);

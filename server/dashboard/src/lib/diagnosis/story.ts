@@ -242,7 +242,7 @@ export function besideAnswer(
     : '';
   return [
     gone.length > 0
-      ? `${called(gone)}: explained by the answer too, because the joints push each other.`
+      ? `${called(gone)}: no longer red with the answer and the numbers that were fitted with it.`
       : '',
     seen.length > 0
       ? `${called(seen)}: the answer explains it only in part, and nothing else was named.${torque}`

@@ -21,7 +21,7 @@ export const OUTCOMES: Record<Outcome, { tone: Tone; title: string; text: string
   missed: {
     tone: 'bad',
     title: 'Missed',
-    text: 'The diagnosis found nothing significant. The effect may be too small for these records to show.',
+    text: 'The diagnosis named no effect. It may be too small for these records, or was taken for a number of the machine.',
   },
   wrong: {
     tone: 'bad',
