@@ -181,7 +181,7 @@ def _fit_motion(
             [("before", begin), ("fitted", found.model)],
             [*traces, *held],
             [t.record.trace_id for t in held],
-            options=Options(loop=options.loop or "closed"),
+            options=Options(loop=options.loop or "closed", quantise=False),
             progress=lambda f, text: progress(0.9 + 0.1 * f, text),
         )
     base = base_parameters(found.model, traces)
@@ -277,3 +277,5 @@ def _print(found: FitResult, agreement: Sequence[ModelAgreement], base: BasePara
     print()
     for line in found.said:
         print_prose(line)
+    if found.verdict is not None and found.verdict.asks_for_diagnosis:
+        print("next: daq diagnose, with the same traces and the model before the fit")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -128,29 +127,29 @@ def _print_result(
 
     print_record(fidelity.record)
     print_prose(fidelity.said)
+    if fidelity.verdict is not None and fidelity.verdict.asks_for_diagnosis:
+        print("next: daq diagnose, with the same model and traces")
     print()
-    _print_joints(fidelity, machine)
+    _print_joints(fidelity)
     if details:
         _print_details(fidelity, three, in_time, machine)
     else:
         console().print("--details: every parameter, and how each would vary in time; --report: figures")
 
 
-def _print_joints(fidelity: Fidelity, machine: Machine) -> None:
+def _print_joints(fidelity: Fidelity) -> None:
     """Prints the residual of each joint compared with its noise, one line each."""
     from rich.table import Table
 
-    from model.units import joint_unit, shown_unit, with_unit
+    from model.units import shown_unit, with_unit
 
     table = Table(box=None, header_style="bold")
     for name in ("joint", "rms left", "noise", "times its noise"):
         table.add_column(name, justify="right")
-    noises = fidelity.noise_by_joint or [math.nan] * len(fidelity.outputs)
-    for joint, square, noise in zip(fidelity.outputs, fidelity.error_by_joint, noises, strict=True):
-        factor, unit = shown_unit(joint_unit(machine, joint))
-        left = math.sqrt(square)
-        sizes = (with_unit(f"{size * factor:.4f}", unit) for size in (left, noise))
-        table.add_row(str(joint), *sizes, f"{left / noise:.2f}")
+    for one in fidelity.left:
+        factor, unit = shown_unit(one.unit)
+        sizes = (with_unit(f"{size * factor:.4f}", unit) for size in (one.rms, one.noise))
+        table.add_row(str(one.joint), *sizes, f"{one.in_noises:.2f}")
     print_table(table)
 
 

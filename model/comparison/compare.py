@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -14,10 +14,11 @@ from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.comparison.agreement import JointAgreement, ModelAgreement, TraceAgreement, pooled
+from model.fitting.judged import noise_left
 from model.fitting.records import Record, Signal, noise_floor, records_of
+from model.fitting.simulated import SimulatedProblem
 from model.machine_model.model import Model
-from model.record_check.check import Loop, as_used, check_records, require_computable
-from model.record_check.replicas import noise_left
+from model.record_check.check import as_used, check_records, require_computable
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
 
@@ -75,12 +76,13 @@ def compare(
     Args:
         models: labels and models, all of the same machine's joints.
         held_out: identities of traces not fitted to; None if nothing was fitted.
+        options: of the simulation; by default in closed loop and without rounding.
 
     Raises:
         TraceError, SpecError: for traces that cannot be simulated, or models that move different joints.
         CancelledError: when cancelled.
     """
-    cancel = cancel or Never()
+    cancel, options = cancel or Never(), options or Options(quantise=False)
     if not models:
         raise SpecError("no model: at least one is needed")
     machine = models[0][1].machine
@@ -91,8 +93,7 @@ def compare(
                 f"{list(machine.modelled_joints)}: they cannot be compared"
             )
     require_computable(check_records(models[0][1], traces, torques=False))
-    loop: Loop = "closed" if options is None else options.loop
-    traces = as_used(traces, machine, loop)
+    traces = as_used(traces, machine, options.loop)
     records = records_of(traces, machine, signal)
     floor = noise_floor(records, machine, signal)
     simulated: list[list[Floats]] = []
@@ -113,7 +114,7 @@ def compare(
             _agreement(
                 record,
                 simulated[k][place],
-                noise_left(model, traces[k : k + 1], loop) if signal == "position" else floor,
+                _noise(model, record, floor, signal, options),
                 model,
                 signal,
                 _role(record, held_out),
@@ -144,6 +145,16 @@ def _role(record: Record, held_out: Collection[str] | None) -> bool | None:
 def _units(model: Model, signal: Signal) -> tuple[str, ...]:
     kinds = [model.machine.joint(j).kind for j in model.machine.modelled_joints]
     return tuple(("rad" if k == "revolute" else "m") + ("/s" if signal == "velocity" else "") for k in kinds)
+
+
+def _noise(model: Model, record: Record, floor: Floats, signal: Signal, options: Options) -> Floats:
+    """Returns (n,) what noise leaves of all samples of a record, and rounding of a simulation that rounds too."""
+    every = replace(record, runs=(slice(0, len(record.measured)),))
+    left = noise_left(SimulatedProblem(model, (every,), (), floor, signal, options.loop, options.step), np.zeros(0)).rms
+    if not options.quantise or signal != "position":
+        return left
+    joints = model.machine.modelled_joints
+    return np.hypot(left, [model.machine.joint(j).count / math.sqrt(12.0) for j in joints])
 
 
 def _agreement(

@@ -138,14 +138,15 @@ class Gap(FrozenRecord):
     """The gap between simulation and measurement, and how it shrinks from stage to stage.
 
     `measure`: of the closed loop, simulated from set points and initial posture alone, or of the balance of torques.
-    `units`, `noise` by joint: the noise is that of the readings, or what noise leaves of the balance. `without`: the
-    alternative to the effects; None where none was added.
+    `units`, `noise`, `most` by joint: what noise leaves of a right model in this measure, and the most that may be
+    noise (empty in results of older versions). `without`: the alternative to the effects; None where none was added.
     """
 
     measure: Literal["closed-loop", "torques"]
     joints: tuple[int, ...]
     units: tuple[str, ...]
     noise: tuple[float, ...]
+    most: tuple[float, ...] = ()
     stages: tuple[GapStage, ...]
     without: GapWithout | None = None
 

@@ -100,7 +100,7 @@ Errors = dict[str, tuple[float | None, ...]]
 
 def gap_of(
     measure: Literal["closed-loop", "torques"],
-    joints: Sequence[tuple[int, str, float]],
+    joints: Sequence[tuple[int, str, float, float]],
     errors: Callable[[Fitted], Errors],
     given: Fitted,
     first: Fitted,
@@ -111,16 +111,17 @@ def gap_of(
     """The gap of a diagnosis.
 
     Args:
-        joints: each with its unit and noise. errors: of a fit. given, first: before anything was fitted, and
-            before any effect was added. taken: the adopted steps, each with the fit without those after it, its numbers
-            within what the file states. end: the last fit. numbers: as `gap_numbers`, of `first`.
+        joints: each with its unit, its noise and the most of it. errors: of a fit. given, first: before anything was
+            fitted, and before any effect was added. taken: the adopted steps, each with the fit without those after it,
+            its numbers within what the file states. end: the last fit. numbers: as `gap_numbers`, of `first`.
     """
     effects = (GapStage(kind="effect", effect=s.effect, joints=s.joints, **errors(after)) for s, after in taken)
     return Gap(
         measure=measure,
-        joints=tuple(joint for joint, _, _ in joints),
-        units=tuple(unit for _, unit, _ in joints),
-        noise=tuple(noise for _, _, noise in joints),
+        joints=tuple(joint for joint, _, _, _ in joints),
+        units=tuple(unit for _, unit, _, _ in joints),
+        noise=tuple(noise for _, _, noise, _ in joints),
+        most=tuple(most for _, _, _, most in joints),
         stages=(
             GapStage(kind="given", **errors(given)),
             *effects,

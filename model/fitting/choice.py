@@ -58,6 +58,21 @@ def chosen_unknowns(model: Model, options: FitOptions) -> tuple[Unknown, ...]:
     return tuple(_unknown(p, expected[p.name], options) for p in wanted)
 
 
+def with_nuisances(
+    model: Model, records: Sequence[Record], options: FitOptions, signal: Signal
+) -> tuple[Model, tuple[Unknown, ...]]:
+    """Returns the model with everything that its nuisances need, and these: numbers that matter to records, and that
+    neither a machine file states nor a model keeps. None for Nelder–Mead, which is the source's."""
+    if options.method == "nelder_mead":
+        return model, ()
+    wider, bends = with_bends(model, options, signal)
+    forms = friction_forms(wider) if options.friction_form else ()
+    if not options.start_posture or signal != "position":
+        return wider, (*bends, *forms)
+    postures = start_postures(model.machine, records, any(use.name == BEND for use in wider.effects))
+    return wider, (*bends, *forms, *postures)
+
+
 def with_bends(model: Model, options: FitOptions, signal: Signal) -> tuple[Model, tuple[Unknown, ...]]:
     """Returns the model with bent potentiometers and the bends as nuisances; without bends, the model as given."""
     if options.sensor_bend is False or signal != "position":

@@ -14,11 +14,12 @@ from daq.contracts.machine import NoController
 from daq.contracts.progress import Cancel, CancelledError, Never, Progress, silent
 from daq.contracts.trace import Trace
 from model.arrays import Floats
-from model.fitting.choice import BEND, chosen_unknowns, friction_forms, start_postures, with_bends
+from model.fitting.choice import chosen_unknowns, with_nuisances
 from model.fitting.consistent_bodies import coordinates_of, on_the_edge
 from model.fitting.covariance import sandwich
 from model.fitting.fitted import FittedParameter, JointError
 from model.fitting.identifiability import IdentifiabilityReport, ParameterVerdict, judged
+from model.fitting.judged import joints_left, rms_of
 from model.fitting.least_squares import Search, Solution, influence, solve
 from model.fitting.nelder_mead import climb
 from model.fitting.noise import noise_effect
@@ -34,7 +35,6 @@ from model.machine_model.posterior import summarise_posterior
 from model.machine_model.record_verdict import JointLeft, RecordVerdict
 from model.record_check.check import as_used, check_records, require_computable
 from model.record_check.finding import doubts_headline
-from model.record_check.replicas import motion_there, noise_left
 
 INTERVAL = 1.959964
 """Number of standard deviations to either side that contain 95 % of a Gaussian."""
@@ -110,15 +110,9 @@ def fit_problem(model: Model, traces: Sequence[Trace], options: FitOptions) -> S
         raise TraceError(
             f"{samples} samples for {len(unknowns)} parameters: there must be more samples than parameters"
         )
-    simple = options.method == "nelder_mead"
-    wider, bends = with_bends(model, options, signal) if not simple else (model, ())
-    postures: tuple[Unknown, ...] = ()
-    if options.start_posture and signal == "position" and not simple:
-        postures = start_postures(model.machine, records, any(use.name == BEND for use in wider.effects))
-    forms = friction_forms(wider) if options.friction_form and not simple else ()
-    every = (*unknowns, *bends, *forms, *postures)
+    wider, nuisances = with_nuisances(model, records, options, signal)
     floor = noise_floor(records, model.machine, signal)
-    return SimulatedProblem(wider, records, every, floor, signal, loop, options.step)
+    return SimulatedProblem(wider, records, (*unknowns, *nuisances), floor, signal, loop, options.step)
 
 
 def _loop(model: Model, options: FitOptions) -> Literal["closed", "open"]:
@@ -252,10 +246,8 @@ def _result(
     own = {u.name: float(v) for u, v in zip(problem.unknowns, solution.values, strict=True) if not u.nuisance}
     identities = tuple(record.name for record in problem.records)
     fitted = model.with_values(own)
-    noise = problem.floor
-    if problem.signal == "position":
-        noise = noise_left(fitted, as_used(traces, model.machine, problem.loop), problem.loop)
-    errors = _errors(model, problem, before, estimate.after, noise)
+    left = joints_left(problem, solution.values, estimate.after, traces)
+    errors = _errors(problem, rms_of(problem, before), left)
     deviations = np.sqrt(np.diag(estimate.covariance))
     parameters = tuple(
         fitted_parameter(u, float(v), float(d), estimate.report.verdict(u.name))
@@ -276,11 +268,7 @@ def _result(
         parameters=parameters,
         identifiability=estimate.report,
         errors=errors,
-        verdict=RecordVerdict.of(
-            fitted,
-            [_left(problem, error, traces) for error in errors],
-            sum(r.samples for r in problem.records),
-        ),
+        verdict=RecordVerdict.of(fitted, left, sum(r.samples for r in problem.records)),
         whitened_mean_square=estimate.mean_square,
         names=names,
         values=tuple(map(float, solution.values)),
@@ -294,12 +282,6 @@ def _result(
         message=solution.message,
         on_the_edge=on_the_edge(model, fitted, options),
     )
-
-
-def _left(problem: SimulatedProblem, error: JointError, traces: Sequence[Trace]) -> JointLeft:
-    there = motion_there(problem.model.machine, error.joint, traces) if problem.signal == "position" else None
-    noise = error.noise or error.floor
-    return JointLeft(joint=error.joint, unit=error.unit, rms=error.after, noise=noise, there=there)
 
 
 def fitted_parameter(u: Unknown, value: float, deviation: float, verdict: ParameterVerdict) -> FittedParameter:
@@ -324,19 +306,14 @@ def fitted_parameter(u: Unknown, value: float, deviation: float, verdict: Parame
     )
 
 
-def _errors(
-    model: Model, problem: SimulatedProblem, before: Sequence[Evaluation], after: Sequence[Evaluation], noise: Floats
-) -> tuple[JointError, ...]:
-    found = []
-    for column, joint in enumerate(model.machine.modelled_joints):
-        first, last = (
-            float(np.sqrt(np.mean(np.concatenate([e.residual[:, column] for e in es]) ** 2))) for es in (before, after)
+def _errors(problem: SimulatedProblem, before: Floats, left: Sequence[JointLeft]) -> tuple[JointError, ...]:
+    """Returns the residual of each joint before the fit, root mean squares (n,), and after it."""
+    return tuple(
+        JointError(
+            joint=one.joint, unit=one.unit, before=float(first), after=one.rms, floor=float(floor), noise=one.noise
         )
-        unit = "rad" if model.machine.joint(joint).kind == "revolute" else "m"
-        unit += "/s" if problem.signal == "velocity" else ""
-        sizes = {"floor": float(problem.floor[column]), "noise": float(noise[column])}
-        found.append(JointError(joint=joint, unit=unit, before=first, after=last, **sizes))
-    return tuple(found)
+        for one, first, floor in zip(left, before, problem.floor, strict=True)
+    )
 
 
 __all__ = ["CancelledError", "FitOptions", "FitResult", "fit", "fit_problem", "with_noise"]

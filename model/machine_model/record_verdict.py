@@ -21,13 +21,14 @@ SCATTER = 4.0
 
 class JointLeft(FrozenRecord):
     """Residual of a model on one joint's records, in `unit`. `rms`: root mean square of the residual; `noise`: that of
-    records that the model itself makes; `there`: of the recorded torque, or of the recorded motion about its mean (None
-    if that hardly exceeds noise of the readings)."""
+    records that the model itself makes, and `scatter` the relative standard deviation of its square; `there`: of the
+    recorded torque, or of the recorded motion about its mean (None if that hardly exceeds noise of the readings)."""
 
     joint: int
     unit: str
     rms: float
     noise: float
+    scatter: float = 0.0
     there: float | None = None
 
     @property
@@ -93,6 +94,11 @@ class RecordVerdict(FrozenRecord):
         return "explains the records" + (", with numbers far from the file" if self.far else "")
 
     @property
+    def asks_for_diagnosis(self) -> bool:
+        """Whether an effect may be missing from the model, or hidden in its numbers."""
+        return not self.doubt and bool(self.left or self.far)
+
+    @property
     def _joints(self) -> str:
         return ", ".join(str(one.joint) for one in self.left)
 
@@ -100,15 +106,21 @@ class RecordVerdict(FrozenRecord):
     def of(cls, model: Model, errors: Sequence[JointLeft], samples: int) -> Self:
         """Returns the verdict on a model with these errors on records of so many samples per joint.
 
-        A joint has more than noise if its excess variance exceeds two limits: the threshold at which a diagnosis looks
-        for a missing effect, and the scatter of a variance of so many samples. The same holds if it is as large as the
-        recorded signal.
+        A joint has more than noise beyond `most_by_chance`, or if its residual is as large as the recorded signal.
         """
-        line = 1.0 + max(MORE_THAN_NOISE, SCATTER * math.sqrt(2.0 / max(samples, 1)))
-        beyond = (e for e in errors if not e.in_noises**2 <= line or e.is_more_than_there)
+        beyond = (e for e in errors if not e.in_noises <= most_by_chance(e.scatter, samples) or e.is_more_than_there)
         left = sorted(beyond, key=lambda e: e.in_noises, reverse=True)
         far = far_numbers(model)
         return cls(explains=not left, left=tuple(left), far=far, text=_text(left, far))
+
+
+def most_by_chance(scatter: float, samples: int) -> float:
+    """Returns the largest residual, in noises, that may be noise alone.
+
+    Its variance may exceed the noise by the threshold at which a diagnosis looks for a missing effect, by what a
+    variance of so many samples scatters, and by the `scatter` of noise from record to record, relative to its variance.
+    """
+    return math.sqrt(1.0 + max(MORE_THAN_NOISE, SCATTER * math.sqrt(2.0 / max(samples, 1)), SCATTER * scatter))
 
 
 def far_numbers(model: Model) -> tuple[FarNumber, ...]:
@@ -126,12 +138,12 @@ def _text(left: Sequence[JointLeft], far: Sequence[FarNumber]) -> str:
     numbers = f"Numbers far from the machine file: {'; '.join(map(str, far))}."
     if left:
         joints = "; ".join(map(_left, left))
-        parts = [f"The model does not explain the records: {joints}.", "`daq diagnose` names what is missing."]
+        parts = [f"The model does not explain the records: {joints}.", "A diagnosis looks for what is missing."]
         return " ".join([parts[0], *([numbers] if far else []), parts[1]])
     if far:
         return (
             f"The model explains the records within their noise, but not with the numbers of the file. {numbers} "
-            "They may stand in for a missing effect: `daq diagnose` compares both."
+            "They may stand in for a missing effect: a diagnosis compares both."
         )
     return "The model explains the records within their noise."
 

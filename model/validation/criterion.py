@@ -8,7 +8,7 @@ from typing import ClassVar
 from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord
 from model.machine_model.model import Model
-from model.machine_model.record_verdict import RecordVerdict
+from model.machine_model.record_verdict import JointLeft, RecordVerdict
 from model.record_check.finding import RecordFinding
 from model.validation.expected_deviation import Basis, Convention, expected_deviation
 
@@ -65,8 +65,8 @@ class Fidelity(FrozenRecord):
     damping_ratio: float
     error: float
     error_by_joint: tuple[float, ...]
-    noise_by_joint: tuple[float, ...] = ()
-    """Root mean square error (rad, m) of a right model; empty in results of older versions."""
+    left: tuple[JointLeft, ...] = ()
+    """What the model leaves of the traces beside its nuisances, by output; empty in results of older versions."""
     parameters: tuple[ParameterDistortion, ...]
     sum_of_contributions: float
     curves: tuple[Curve, ...] = ()

@@ -12,14 +12,13 @@ from daq.contracts.errors import SpecError
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
 from model.arrays import Floats
+from model.fitting.judged import left_beside_nuisances
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
-from model.machine_model.record_verdict import JointLeft, RecordVerdict
+from model.machine_model.record_verdict import RecordVerdict
 from model.record_check.check import as_used, check_records, require_computable
 from model.record_check.finding import doubts_headline
-from model.record_check.replicas import motion_there, noise_left
 from model.simulation.prepared import Options
-from model.units import joint_unit
 from model.validation.criterion import (
     DAMPING_RATIO,
     Curve,
@@ -95,13 +94,7 @@ def validate_by_distortion(
     )
     errors = error.by_joint(varied.best[None])[0]
     distortions = [_distortion(p, d, damping_ratio) for p, d in zip(varied.parameters, doublings, strict=True)]
-    machine = model.machine
-    noises = dict(zip(machine.modelled_joints, map(float, noise_left(model, error.traces)), strict=True))
-    there = {j: motion_there(machine, j, traces) for j in error.outputs}
-    left = [
-        JointLeft(joint=j, unit=joint_unit(machine, j), rms=math.sqrt(e), noise=noises[j], there=there[j])
-        for j, e in zip(error.outputs, errors, strict=True)
-    ]
+    left = [one for one in left_beside_nuisances(model, traces) if one.joint in error.outputs]
     verdict = RecordVerdict.of(model, left, sum(map(len, error.traces)))
     return Fidelity(
         model=model.identity,
@@ -111,7 +104,7 @@ def validate_by_distortion(
         damping_ratio=damping_ratio,
         error=least,
         error_by_joint=tuple(map(float, errors)),
-        noise_by_joint=tuple(one.noise for one in left),
+        left=tuple(left),
         verdict=verdict.doubted(doubts_headline(record)),
         parameters=tuple(distortions),
         sum_of_contributions=math.fsum(d.contribution for d in distortions),

@@ -9,12 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.errors import DaqError, SpecError
+from daq.contracts.machine import NoController
 from daq.contracts.trace import Trace
 from model.arrays import Floats, Mask
 from model.machine_model.model import Model
 from model.record_check.check import as_used
-from model.record_check.replicas import SEED, made_by
 from model.simulation.chain_of_model import gravity_loads
+from model.simulation.inputs import inputs_of
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from model.validation.acceleration_model import expected_accelerations
 from model.validation.expected_deviation import expected_deviation
 from model.validation.measured_motion import SmoothedTrace, smooth, smooth_motion
@@ -185,6 +188,7 @@ FEWEST, MOST = 12, 40
 """Least and largest number of replicas of a record."""
 SECONDS = 400.0
 """Total length of motion (s) of a record's replicas: in a short record friction changes sign only a few times."""
+SEED = 1991
 
 
 def noise_floor(model: Model, trace: Trace, smoothed: SmoothedTrace) -> tuple[Floats, bool]:
@@ -199,13 +203,32 @@ def noise_floor(model: Model, trace: Trace, smoothed: SmoothedTrace) -> tuple[Fl
     sizes = np.zeros((replicas, model.joint_count))
     try:
         for replica in sizes:
-            own = smooth_motion(model, made_by(model, trace, rng), smoothing)
+            own = smooth_motion(model, _made_by(model, trace, rng), smoothing)
             left = np.where(own.usable, own.acceleration - expected_accelerations(model, own.motion, ())[0], 0.0)
             replica[:] = np.sqrt((left**2).sum(axis=0) / np.maximum(own.usable.sum(axis=0), 1))
     except DaqError:
         return smoothed.noise, False
     median = np.median(sizes, axis=0)
     return np.where(median > 0, median, smoothed.noise), True
+
+
+def _made_by(model: Model, trace: Trace, rng: np.random.Generator) -> Trace:
+    """Simulates a record of the model with noise and rounding: in closed loop if there are set points, else from the
+    drive."""
+    machine = model.machine
+    closed = trace.set_point is not None and not isinstance(machine.controller, NoController)
+    sensors = [machine.joint(j).sensor for j in machine.modelled_joints]
+    deviation = np.array([0.0 if s is None or s.noise is None else s.noise.value for s in sensors])
+    noise = deviation * rng.standard_normal((len(inputs_of(trace, machine)), len(sensors)))
+    run = simulate(model, trace, Options(loop="closed" if closed else "open", noise=noise))
+    columns = [trace.column(j) for j in machine.modelled_joints]
+    position = trace.position.copy()
+    position[:, columns] = run.at_samples(run.reading)
+    if trace.drive is None:
+        return replace(trace, position=position)
+    drive = trace.drive.copy()
+    drive[:, columns] = run.at_samples(run.drive)
+    return replace(trace, position=position, drive=drive)
 
 
 # --- Quantities on which a variation may depend (a joint's position, speed, load and so on), and their correlations

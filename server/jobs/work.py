@@ -110,7 +110,7 @@ class _Worker:
             [*traces, *held],
             request.held_out,
             FIT_SHARE,
-            options=Options(loop=options.loop or "closed"),
+            options=Options(loop=options.loop or "closed", quantise=False),
         )
         self._keep_model(found.model)
         data = FitData(

@@ -92,7 +92,8 @@ def _gap(standing: Standing, given: Fit, joints: Sequence[int]) -> Gap:
     taken = [(step, _within_file(standing, standing.adopted[k:])) for k, step in enumerate(standing.adopted, start=1)]
     numbers = gap_numbers(case.given.machine, standing.first.values, standing.now.values)
     columns = [case.given.machine.modelled_joints.index(j) for j in joints]
-    told = [(j, case.unit(j), float(case.noise[c])) for j, c in zip(joints, columns, strict=True)]
+    noise, most = case.noise_of_errors(standing.now)
+    told = [(j, case.unit(j), float(noise[c]), float(most[c])) for j, c in zip(joints, columns, strict=True)]
 
     def errors(one: Fit) -> dict[str, tuple[float | None, ...]]:
         return {name: tuple(own[c] for c in columns) if own else () for name, own in case.errors(one).items()}

@@ -132,6 +132,10 @@ class Case(ABC):
         """Errors of every joint, as the gap between model and records is shown."""
 
     @abstractmethod
+    def noise_of_errors(self, now: Fit) -> tuple[Floats, Floats]:
+        """(n,) what noise leaves of such errors of the fitted records, and (n,) how much it may leave at most."""
+
+    @abstractmethod
     def bias(self, now: Fit, parameters: Sequence[Parameter]) -> dict[str, float]:
         """How far estimates may be off beside what noise does, by name."""
 

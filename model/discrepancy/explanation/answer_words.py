@@ -12,7 +12,6 @@ from model.discrepancy.diagnosis import (
     Gap,
     NextExperiment,
     RemainingShape,
-    SignalError,
     Step,
     Suspicion,
     Where,
@@ -204,10 +203,9 @@ def doubts_of(found: Diagnosis) -> list[str]:
     said = []
     if (left := notes.get("torque-left")) is not None and left.values["after"] >= 1.0:
         said.append(f"{plain(100.0 * left.values['after'], 3)} % of the recorded torque is left")
-    known = [e for e in (*found.rmse_fit, *found.rmse_holdout) if 0.0 < e.after < NOISE_UNKNOWN * e.floor]
-    most = max(known, key=_noises, default=None)
-    if most is not None and _noises(most) > WITHIN_NOISE:
-        said.append(f"joint {most.joint} is left with {plain(_noises(most), 2)} times its noise")
+    noises, joint = max(_beyond_noise(found), default=(0.0, 0))
+    if noises:
+        said.append(f"joint {joint} is left with {plain(noises, 2)} times its noise")
     if (moved := notes.get("stated-numbers-moved")) is not None:
         farthest = moved.values["numbers"][0]
         number = found.model_before.by_name.get(farthest["name"])
@@ -218,8 +216,13 @@ def doubts_of(found: Diagnosis) -> list[str]:
     return said
 
 
-def _noises(error: SignalError) -> float:
-    return error.after / error.floor
+def _beyond_noise(found: Diagnosis) -> list[tuple[float, int]]:
+    """Errors of the answer beyond noise, in noises, and their joints: as the search compares them, and of the gap."""
+    errors = [(e.after, e.floor, WITHIN_NOISE * e.floor, e.joint) for e in (*found.rmse_fit, *found.rmse_holdout)]
+    if found.gap is not None and found.gap.most:
+        gap = found.gap
+        errors += zip((e or 0.0 for e in gap.stages[-1].fitted), gap.noise, gap.most, gap.joints, strict=True)
+    return [(error / noise, joint) for error, noise, most, joint in errors if most < error < NOISE_UNKNOWN * noise]
 
 
 def what_is_left(remaining: Sequence[RemainingShape]) -> str:

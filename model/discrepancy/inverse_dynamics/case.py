@@ -145,6 +145,10 @@ class TorqueCase(Case):
         held = () if self.held_out is None else _roots(self.held_squares(now))
         return {"fitted": _roots(self.compared.samples.mean_squares(now.signals)), "held_out": held}
 
+    def noise_of_errors(self, now: Fit) -> tuple[Floats, Floats]:  # noqa: ARG002 (of the records)
+        """The noise of the torques, which is not known well."""
+        return self.noise, WITHIN_NOISE * self.noise
+
     def bias(self, now: Fit, parameters: Sequence[Parameter]) -> dict[str, float]:  # noqa: ARG002
         """None is known."""
         return {}

@@ -33,15 +33,16 @@ from model.discrepancy.readings.observation import Observation, observe
 from model.discrepancy.readings.residual import ReadingResidual, samples_of
 from model.discrepancy.readings.tones import propose_tones
 from model.discrepancy.readings.trials import list_trials
-from model.discrepancy.thresholds import FEEDBACK_SHARE, LARGER_PART, THRESHOLDS
+from model.discrepancy.thresholds import FEEDBACK_SHARE, LARGER_PART, THRESHOLDS, WITHIN_NOISE
 from model.discrepancy.verdict import Errors, unexplained
 from model.effects.library import effect
 from model.fitting.covariance import inverse
+from model.fitting.judged import replicas_for
 from model.fitting.phases import phase_unknowns
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 from model.machine_model.parameter import Kind, Parameter
-from model.machine_model.record_verdict import FAR_OFF
+from model.machine_model.record_verdict import FAR_OFF, most_by_chance
 from model.units import joint_unit
 
 FLAGGED_SHARE = 0.1
@@ -281,15 +282,35 @@ class ReadingCase(Case):
 
     def errors(self, now: Fit) -> Errors:
         """Root mean squares of the closed loop alone: in the search, the simulation follows a share of the record, so
-        that one with a wrong effect stays near enough to be compared. There the gap is smaller."""
-        found: Errors = {}
-        for name, one in (("fitted", self.compared), ("held_out", self.held_out)):
-            found[name] = ()
-            if one is not None:
-                alone = one.on(one.observation.with_drive_as_input(False).with_feedback_share(0.0))
-                squares = one.samples.mean_squares(alone.of_model(now.model).at(now.values))
-                found[name] = tuple(float(np.sqrt(s)) if np.isfinite(s) else None for s in squares)
+        that one with a wrong effect stays near enough to be compared. There the gap is smaller.
+
+        The nuisances of a record have the values that suit the loop alone: a part of what the form of friction near
+        rest does shows only there.
+        """
+        best = self._in_loop_alone(now)
+        found: Errors = {"fitted": _roots(best.squares), "held_out": ()}
+        if self.held_out is not None:
+            alone = _alone(self.held_out, now)
+            found["held_out"] = _roots(alone.samples.mean_squares(alone.at({**now.values, **best.values})))
         return found
+
+    def noise_of_errors(self, now: Fit) -> tuple[Floats, Floats]:
+        """Of the closed loop alone, and by the criterion of a fit's verdict."""
+        values = {**now.values, **self._in_loop_alone(now).values}
+        seconds = sum(p.period * len(p.noise) for p in self.compared.observation.prepared)
+        squares = _noise_squares(_alone(self.compared, now), values, replicas_for(seconds))
+        if not np.isfinite(squares).all():
+            return self.noise, WITHIN_NOISE * self.noise
+        mean = np.mean(squares, axis=0)
+        scatter = np.std(squares, axis=0, ddof=1) / mean
+        return np.sqrt(mean), np.sqrt(mean) * [most_by_chance(s, self._counts[0]) for s in scatter]
+
+    def _in_loop_alone(self, now: Fit) -> Fit:
+        """The nuisances of a fit that suit the closed loop alone."""
+        nuisances = [u for u in now.unknowns if u.nuisance]
+        names = {u.name for u in nuisances}
+        others = {name: value for name, value in now.values.items() if name not in names}
+        return fit(replace(_alone(self.compared, now), fixed=others), nuisances, now.values, now.memory)
 
     def bias(self, now: Fit, parameters: Sequence[Parameter]) -> dict[str, float]:
         """How far estimates move when the simulated controller is given more of the record: a measure of the bias from
@@ -308,6 +329,15 @@ class ReadingCase(Case):
         return {u.name: moved.values[u.name] - now.values[u.name] for u in own} if math.isfinite(moved.cost) else {}
 
 
+def _alone(compared: ReadingResidual, now: Fit) -> ReadingResidual:
+    """A model's closed loop alone, along the same records."""
+    return compared.on(compared.observation.with_drive_as_input(False).with_feedback_share(0.0)).of_model(now.model)
+
+
+def _roots(squares: Floats) -> tuple[float | None, ...]:
+    return tuple(float(np.sqrt(s)) if np.isfinite(s) else None for s in squares)
+
+
 def noise_floor(compared: ReadingResidual, values: Values) -> Floats:
     """Root mean square of each joint's residual, (n,) rad, over simulated records of an arm that is this model. Where
     its simulations in closed loop do not stay finite: the noise of a reading.
@@ -315,6 +345,12 @@ def noise_floor(compared: ReadingResidual, values: Values) -> Floats:
     It is more than the noise of one reading: the part of that noise which the simulated controller is not given goes
     round the real loop and moves the arm a little near standstill.
     """
+    found = np.sqrt(np.mean(_noise_squares(compared, values, REPLICAS), axis=0))
+    return found if np.isfinite(found).all() else compared.observation.deviations
+
+
+def _noise_squares(compared: ReadingResidual, values: Values, replicas: int) -> Floats:
+    """(replicas, n) mean squares of simulated records of an arm that is this model."""
     observation = compared.observation
     truth = replace(compared, own=(), fixed={})
     if compared.own:  # the postures that are known are of other records
@@ -322,15 +358,14 @@ def noise_floor(compared: ReadingResidual, values: Values) -> Floats:
     rng = np.random.default_rng(SEED)
     scale = observation.deviations / observation.unit
     squares = []
-    for _ in range(REPLICAS):
+    for _ in range(replicas):
         noise = [rng.normal(size=p.noise.shape) for p in observation.prepared]
         if observation.noise is not None:
             filters = observation.noise.whiteners
             noise = [np.stack([w.coloured(n) for w, n in zip(filters, one.T, strict=True)], axis=1) for one in noise]
         replica = observation.imagined(truth.model, truth.state(values), [scale * one for one in noise])
         squares.append(truth.samples.mean_squares(truth.on(replica).at(values)))
-    found = np.sqrt(np.mean(squares, axis=0))
-    return found if np.isfinite(found).all() else observation.deviations
+    return np.array(squares)
 
 
 def reading_case(

@@ -129,7 +129,7 @@ def test_joints_with_more_than_noise_are_named_the_worst_first() -> None:
     assert [one.joint for one in found.left] == [2, 3]
     assert found.text == (
         "The model does not explain the records: joint 2 is left with 2.1 times its noise (0.12°); "
-        "joint 3 is left with 1.5 times its noise (0.0859°). `daq diagnose` names what is missing."
+        "joint 3 is left with 1.5 times its noise (0.0859°). A diagnosis looks for what is missing."
     )
     assert found.headline == "does not explain the records (joints 2, 3)"
 
@@ -137,6 +137,12 @@ def test_joints_with_more_than_noise_are_named_the_worst_first() -> None:
 @pytest.mark.parametrize(("samples", "explains"), [(50, True), (MANY, False)])
 def test_what_few_samples_may_leave_by_chance_is_noise(samples: int, explains: bool) -> None:
     assert RecordVerdict.of(arm(), left(1.2), samples).explains is explains
+
+
+@pytest.mark.parametrize(("scatter", "explains"), [(0.0, False), (0.2, True)])
+def test_what_noise_scatters_from_record_to_record_is_noise(scatter: float, explains: bool) -> None:
+    found = [one.model_copy(update={"scatter": scatter}) for one in left(1.2)]
+    assert RecordVerdict.of(arm(), found, MANY).explains is explains
 
 
 def test_a_number_far_from_its_file_is_shown_beside_it_although_the_model_explains_the_records() -> None:
@@ -147,7 +153,7 @@ def test_a_number_far_from_its_file_is_shown_beside_it_although_the_model_explai
     assert found.explains
     assert [n.name for n in found.far] == ["link2.mass"]
     assert f"link2.mass {mass.value + 5.0 * mass.deviation:.3g} kg (file: {mass.value:.3g} ±" in found.text
-    assert found.text.endswith("They may stand in for a missing effect: `daq diagnose` compares both.")
+    assert found.text.endswith("They may stand in for a missing effect: a diagnosis compares both.")
     assert not far_numbers(arm().with_values({"link2.mass": mass.value + 3.0 * mass.deviation}))
 
 
@@ -156,7 +162,7 @@ def test_a_hidden_friction_is_not_explained_by_numbers_that_its_fit_has_moved() 
     rubbing = arm().with_effect("stribeck_friction", (2,), {"torque": 20.0})
     found = fit(arm(), [trace(rubbing, 0), trace(rubbing, 1)], FitOptions(rounds=1)).verdict
     assert found.text != "The model explains the records within their noise."
-    assert "`daq diagnose`" in found.text
+    assert "diagnosis" in found.text
 
 
 def test_as_much_left_as_was_recorded_is_no_explanation() -> None:

@@ -167,8 +167,22 @@ def test_the_gap_is_what_the_readings_say_beside_the_motion_of_the_arm_alone() -
     waved = imagined.changed(recorded, position=recorded.position + sign[:, None] * np.array([1.0, 0.0, 2.0]))
     case = case_of(ARM, [waved])
     now = at_start(case)
-    assert case.errors(now) == {"fitted": pytest.approx((wave, 0.0, 2 * wave), rel=0.01, abs=5e-4), "held_out": ()}
+    bare = case.errors(replace(now, unknowns=()))
+    assert bare == {"fitted": pytest.approx((wave, 0.0, 2 * wave), rel=0.01, abs=5e-4), "held_out": ()}
     assert np.sqrt(now.squares[0]) > 1.2 * wave
+    followed = np.array(case.errors(now)["fitted"]) / np.array([wave, 1.0, 2 * wave])
+    assert (followed[[0, 2]] > 0.9).all()  # what belongs to no model follows little of it
+    assert (followed[[0, 2]] < 1.0).all()
+
+
+def test_the_gap_of_a_right_model_is_the_noise_of_the_same_loop() -> None:
+    """Neither the noise of the simulation that follows the record, nor that of a reading alone."""
+    case = case_of(ARM, [imagined.trace(ARM, number) for number in (0, 1)])
+    now = at_start(case)
+    noise, most = case.noise_of_errors(now)
+    np.testing.assert_allclose(case.errors(now)["fitted"], noise, rtol=0.15)
+    assert (noise / case.noise).max() > 1.2
+    assert (most >= np.sqrt(1.3) * noise).all()
 
 
 def test_a_bias_is_how_far_an_estimate_moves_nearer_to_the_record_while_all_else_stays() -> None:

@@ -2849,10 +2849,10 @@ export interface components {
             /** Error By Joint */
             error_by_joint: number[];
             /**
-             * Noise By Joint
+             * Left
              * @default []
              */
-            noise_by_joint?: number[];
+            left?: components["schemas"]["JointLeft"][];
             /** Parameters */
             parameters: components["schemas"]["ParameterDistortion"][];
             /** Sum Of Contributions */
@@ -3331,8 +3331,8 @@ export interface components {
          * @description The gap between simulation and measurement, and how it shrinks from stage to stage.
          *
          *     `measure`: of the closed loop, simulated from set points and initial posture alone, or of the balance of torques.
-         *     `units`, `noise` by joint: the noise is that of the readings, or what noise leaves of the balance. `without`: the
-         *     alternative to the effects; None where none was added.
+         *     `units`, `noise`, `most` by joint: what noise leaves of a right model in this measure, and the most that may be
+         *     noise (empty in results of older versions). `without`: the alternative to the effects; None where none was added.
          */
         Gap: {
             /**
@@ -3346,6 +3346,11 @@ export interface components {
             units: string[];
             /** Noise */
             noise: number[];
+            /**
+             * Most
+             * @default []
+             */
+            most?: number[];
             /** Stages */
             stages: components["schemas"]["GapStage"][];
             without?: components["schemas"]["GapWithout"] | null;
@@ -3861,8 +3866,8 @@ export interface components {
         /**
          * JointLeft
          * @description Residual of a model on one joint's records, in `unit`. `rms`: root mean square of the residual; `noise`: that of
-         *     records that the model itself makes; `there`: of the recorded torque, or of the recorded motion about its mean (None
-         *     if that hardly exceeds noise of the readings).
+         *     records that the model itself makes, and `scatter` the relative standard deviation of its square; `there`: of the
+         *     recorded torque, or of the recorded motion about its mean (None if that hardly exceeds noise of the readings).
          */
         JointLeft: {
             /** Joint */
@@ -3873,6 +3878,11 @@ export interface components {
             rms: number;
             /** Noise */
             noise: number;
+            /**
+             * Scatter
+             * @default 0
+             */
+            scatter?: number;
             /** There */
             there?: number | null;
         };
