@@ -18,16 +18,43 @@ export function newestEvents(
   return [...told.filter((event) => !known.has(event.number)), ...asked].slice(0, most);
 }
 
-/** Rows that follow one another and say the same, as one: a press of Stop is sent until it is answered. */
-export function together<T>(rows: readonly T[], said: (row: T) => string): { row: T; times: number }[] {
-  const found: { row: T; times: number }[] = [];
-  for (const row of rows) {
+/** Rows that say the same: the newest, and when the oldest was. */
+export interface Group<T> {
+  row: T;
+  since: string;
+  all: T[];
+}
+
+/** Rows by their times, the newest first: one that counts repeats is told late. Those that follow one another and say the
+ * same are one group: a press of Stop is sent until it is answered. */
+export function together<T extends { at: string }>(rows: readonly T[], said: (row: T) => string): Group<T>[] {
+  const found: Group<T>[] = [];
+  for (const row of rows.toSorted((one, other) => Date.parse(other.at) - Date.parse(one.at))) {
     const last = found.at(-1);
-    if (last !== undefined && said(last.row) === said(row)) last.times += 1;
-    else found.push({ row, times: 1 });
+    if (last !== undefined && said(last.row) === said(row)) {
+      last.all.push(row);
+      last.since = row.at;
+    } else found.push({ row, since: row.at, all: [row] });
   }
   return found;
 }
+
+/** How often, as the end of a sentence: `, 17 times since 11:51:22`; empty for once. */
+export function timesText(
+  { row, since }: Pick<Group<{ at: string }>, 'row' | 'since'>,
+  count: number,
+): string {
+  if (count <= 1) return '';
+  const [first, last] = [timeOfDay(since), timeOfDay(row.at)];
+  return `, ${count} times${first === last ? '' : ` since ${first}`}`;
+}
+
+/** What an event says by itself, without its kind, which a phone has no room for: `the queue was paused`. */
+export function eventText({ kind, text }: Pick<ServiceEvent, 'kind' | 'text'>): string {
+  return kind in SUBJECTS ? `${SUBJECTS[kind]} was ${text}` : text;
+}
+
+const SUBJECTS: Readonly<Record<string, string>> = { queue: 'the queue', connection: 'the arm' };
 
 /** The service's name in its prose for those who need none. */
 const AT_SERVICE = "somebody at the service's computer";
