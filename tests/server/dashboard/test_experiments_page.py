@@ -151,7 +151,7 @@ def test_what_runs_shows_its_progress_and_is_stopped_from_the_queue(dashboard: D
     expect(form.get_by_text(re.compile(r"of \d+"))).to_be_visible()
     form.get_by_role("button", name="Stop the experiment").click()
     expect(form.get_by_text("The arm is stopped.")).to_be_visible()
-    expect(form.get_by_text("cancelled", exact=True).first).to_be_visible()
+    expect(form.get_by_text("stopped", exact=True).first).to_be_visible()
     assert dashboard.mock is not None
     assert dashboard.mock.ask("state")["frozen"]
 
