@@ -25,7 +25,7 @@ import type {
   SystemStatus,
 } from '../api/types';
 import { LinkHealth, NOT_OPEN } from '../link/health';
-import { armNow } from '../stop/standing';
+import { armNow, isResetOver } from '../stop/standing';
 import { fleet } from '../fleet/fleet.svelte';
 import { stop } from '../stop/stop.svelte';
 import { ServiceClock, STALE_AFTER } from './age';
@@ -314,6 +314,7 @@ class Live {
         break;
       case 'robot':
         this.markStop(message);
+        if (isResetOver(this.toldRobot, message)) stop.isReset = false;
         this.toldRobot = message;
         this.tellStop();
         break;
