@@ -76,5 +76,7 @@ describe('who stopped the arm or paused the queue', () => {
     expect(withStopper({ ...stopped, arm: 'fault' }, [event('stop', NOON)], you)?.cause).toBe('on request');
     const resumedBefore = event('queue', '2026-11-30T11:59:59Z');
     expect(withPauser(paused, [event('queue', NOON, null), resumedBefore], you)).toBe(paused);
+    const stoppedBefore = event('stop', '2026-11-30T11:59:57Z');
+    expect(withPauser(paused, [resumedBefore, stoppedBefore], you)).toBe(paused);
   });
 });

@@ -101,11 +101,12 @@ export function withPauser(
 ): QueueStatus | null {
   if (queue === null) return null;
   const since = Date.parse(queue.since);
-  const by = events.find(({ kind, actor, at }) => {
-    const after = Date.parse(at) - since;
-    return actor != null && ((kind === 'queue' && after >= 0) || (kind === 'stop' && after > -CAUSED_WITHIN));
-  });
-  if (by === undefined) return queue;
+  const by = events.find(
+    ({ kind, actor, at }) =>
+      actor != null && (kind === 'queue' || (kind === 'stop' && Date.parse(at) - since > -CAUSED_WITHIN)),
+  );
+  // Whoever resumed it before has ended the pause of an earlier stop: this one is the service's.
+  if (by === undefined || (by.kind === 'queue' && Date.parse(by.at) < since)) return queue;
   if (by.kind === 'stop')
     return queue.paused
       ? { ...queue, reason: `${pressed(by, who)}: look at the arm, then resume the queue` }
