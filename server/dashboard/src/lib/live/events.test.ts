@@ -1,7 +1,16 @@
 import { describe, expect, it } from 'vitest';
-import type { QueueStatus, RobotMessage, ServiceEvent } from '../api/types';
+import type { Experiment, QueueStatus, RobotMessage, ServiceEvent } from '../api/types';
 import { timeOfDay } from '../format';
-import { eventText, newestEvents, timesText, together, withPauser, withStopper, withYou } from './events';
+import {
+  endReason,
+  eventText,
+  newestEvents,
+  timesText,
+  together,
+  withPauser,
+  withStopper,
+  withYou,
+} from './events';
 
 const event = (kind: string, at: string, actor: string | null = 'local'): ServiceEvent =>
   ({ kind, at, actor }) as ServiceEvent;
@@ -69,6 +78,17 @@ describe('who stopped the arm or paused the queue', () => {
     expect(withStopper({ ...stopped, cause }, [ended], you)?.cause).toBe('cancelled by you');
     expect(withStopper(stopped, [ended, event('stop', NOON)], you)?.cause).toBe(stop);
     expect(withYou('cancelled by anna', you)).toBe('cancelled by anna');
+  });
+
+  it('is why a run ended that went on then', () => {
+    const run = { reason: 'on request', started: '2026-11-30T11:59:50Z', ended: LATER } as Experiment;
+    expect(endReason(run, [event('stop', NOON)], you)).toBe(stop);
+    expect(endReason({ ...run, ended: '2026-11-30T11:59:55Z' }, [event('stop', NOON)], you)).toBe(
+      'on request',
+    );
+    expect(endReason({ ...run, reason: 'cancelled by local' }, [event('stop', NOON)], you)).toBe(
+      'cancelled by you',
+    );
   });
 
   it('is left to the service where nobody did through it', () => {

@@ -1,6 +1,6 @@
 /** What happened at the arm and who asked for it, in one wording: events name the caller, the service's prose may not. Pure. */
 
-import type { QueueStatus, RobotMessage, ServiceEvent } from '../api/types';
+import type { Experiment, QueueStatus, RobotMessage, ServiceEvent } from '../api/types';
 import { timeOfDay } from '../format';
 
 /** A name as the person at this page reads it; of whoever pressed Stop, `stoppedAt` some time. */
@@ -69,6 +69,20 @@ export function withYou(reason: string, who: Who): string {
 
 const pressed = (event: ServiceEvent, who: Who): string =>
   `${who(event.actor!, event.at)} pressed STOP at ${timeOfDay(event.at)}`;
+
+/** Why an experiment ended, with who pressed Stop while it ran, as the person at this page reads it. */
+export function endReason(
+  { reason, started, ended }: Pick<Experiment, 'reason' | 'started' | 'ended'>,
+  events: readonly ServiceEvent[],
+  who: Who,
+): string {
+  const named = withYou(reason, who);
+  if (named !== reason || !started || !ended) return named;
+  const isMeanwhile = (at: string): boolean =>
+    Date.parse(started) <= Date.parse(at) && Date.parse(at) <= Date.parse(ended);
+  const by = events.find(({ kind, actor, at }) => kind === 'stop' && actor != null && isMeanwhile(at));
+  return by === undefined ? reason : pressed(by, who);
+}
 
 /** Beginning of the cause of a stop by the service itself, which does not know there for which of two reasons. */
 const BY_SERVICE = 'by the service: the experiment was cancelled';
