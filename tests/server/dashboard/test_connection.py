@@ -47,3 +47,20 @@ def test_a_service_that_hangs_is_missed_and_found_again(dashboard: Dashboard) ->
     expect(page.get_by_text("No connection to the service.")).not_to_be_attached()
     expect(page.get_by_role("banner").get_by_text(LIVE).or_(dashboard.degraded)).to_be_visible()
     dashboard.forgive()
+
+
+def test_a_reset_says_nothing_of_an_arm_that_is_disconnected_and_the_screen_at_the_arm_says_where_to_connect(
+    dashboard: Dashboard,
+) -> None:
+    page = dashboard.until_live()
+    page.keyboard.press("F8")
+    page.get_by_role("button", name="Reset").click()
+    reset = page.locator("[data-banner=reset]")
+    expect(reset).to_contain_text("holds its posture")
+    dashboard.service.robot.post("/disconnect")
+    expect(reset).not_to_be_attached()
+    dashboard.open("kiosk")
+    page.locator(".state").get_by_role("link", name="Live").click()
+    page.get_by_role("button", name="Connect").click()
+    expect(page.get_by_text("The queue is paused")).to_be_visible()
+    expect(reset).not_to_be_attached()
