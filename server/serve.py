@@ -113,6 +113,12 @@ def _both(section: ServiceSettings) -> tuple[socket.socket, socket.socket]:
     raise AssertionError("the last attempt returns or raises")
 
 
+CHOOSE = {
+    "server.port": "Choose another --port.",
+    "server.stop_port": "Stops are taken at the port after --port: choose another one, or set server.stop_port.",
+}
+
+
 def _bound(host: str, port: int, setting: str) -> socket.socket:
     listener: socket.socket | None = None
     try:
@@ -124,7 +130,7 @@ def _bound(host: str, port: int, setting: str) -> socket.socket:
         if listener is not None:
             listener.close()
         why = error.strerror if isinstance(error, OSError) and error.strerror else error
-        line = f"server.host {host}, {setting} {port}: cannot be listened at: {why}"
+        line = f"server.host {host}, {setting} {port}: cannot be listened at: {why}. {CHOOSE[setting]}"
         raise ReachError(line) from error
     return listener
 

@@ -32,7 +32,7 @@ LOOK_EVERY = 0.2
 REAL_ARM = "a demonstration needs the mock: this robot is a real arm, or another machine"
 ENDED = ("done", "failed", "cancelled", "interrupted")
 TAG = "demonstration"
-"""Of its traces: they are of another arm than the page's."""
+"""Of its traces, and in the name of its diagnosis and of the model from it: they are of another arm than the page's."""
 log = logging.getLogger("server.demonstration")
 
 
@@ -154,7 +154,7 @@ class Demonstrations(Part):
         assert hidden.trace is not None
         assert hidden.held_out is not None
         request = DiagnoseRequest(
-            traces=(hidden.trace,), held_out=(hidden.held_out,), most_steps=1, name=f"hidden {hidden.id}"
+            traces=(hidden.trace,), held_out=(hidden.held_out,), most_steps=1, name=f"{TAG} {hidden.id}"
         )
         diagnosis, _ = rig.jobs.submit(request, by, None)
         return self._keep(rig, hidden, state="diagnosing", diagnosis=diagnosis.id)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -112,6 +113,8 @@ def saved_report(data: Diagnosis, names: Mapping[str, str], sections: Iterable[S
         raise SpecError("the report needs the dashboard's page, which is not built: run `make page`")
     saved = {
         "headline": headline(data),
+        "model": data.model_before.identity,
+        "written": datetime.now(UTC).isoformat(timespec="minutes"),
         "found": data.model_dump(mode="json"),
         "names": dict(names),
         "sections": [section_html(section) for section in sections],

@@ -21,7 +21,7 @@ from trials.judge import score
 from trials.rigs.bodies import mjcf
 from trials.rigs.drawing import sound_rig
 from trials.rigs.folder import write_rig
-from trials.rigs.hiding import OPEN, effects_of, hide, joints_of, known, tilted
+from trials.rigs.hiding import IN_NO_LIBRARY, effects_of, hide, joints_of, known, tilted
 from trials.rigs.kinds import KINDS, REPORTED, REPORTING, TUNING
 from trials.rigs.lab import machine_text
 from trials.rigs.recorded_rig import hidden_rig, make_rig
@@ -133,7 +133,7 @@ def test_every_effect_in_each_of_its_laws_leaves_a_loop_that_runs() -> None:
     for effect in effects_of(sound_rig("axis-pid", KINDS["axis-pid"], 5)):
         rig = hidden_rig("axis-pid", 5, effect=effect)
         assert [hidden.name for hidden in rig.hidden] == [effect]
-        assert rig.hidden[0].in_library == (effect not in OPEN)
+        assert rig.hidden[0].in_library == (effect not in IN_NO_LIBRARY)
 
 
 def test_a_base_that_turns_about_x_leans_its_weight_to_y() -> None:

@@ -74,7 +74,10 @@ def assert_same(usual: Diagnosis, other: Diagnosis, factor: float, exact: float)
         assert [c.effect for c in same.group] == [c.effect for c in step.group]
         for name, value in step.parameters.items():
             scale = factor if value.unit in IN_DRIVE else 1.0
-            assert same.parameters[name].value / scale == pytest.approx(value.value, rel=exact, abs=1e-9)
+            # a search ends within a small share of a deviation, at which one depends on the last bit
+            end = 0.0 if value.low is None or value.high is None else 0.15 * (value.high - value.low) / 2.0
+            near = pytest.approx(value.value, rel=exact, abs=max(end, 1e-9))
+            assert same.parameters[name].value / scale == near
 
 
 @pytest.mark.slow

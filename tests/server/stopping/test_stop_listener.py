@@ -436,6 +436,6 @@ def test_a_service_whose_stop_cannot_be_listened_for_does_not_start() -> None:
     with listening(ServiceSettings(port=0)) as (_, taken):
         taken.listen()
         port = taken.getsockname()[1]
-        line = f"server.host 127.0.0.1, server.stop_port {port}: cannot be listened at"
+        line = f"server.host 127.0.0.1, server.stop_port {port}: cannot be listened at: .*port after --port"
         with pytest.raises(ReachError, match=line), listening(ServiceSettings(port=0, stop_port=port)):
             pass

@@ -58,13 +58,7 @@ function labelOf(kinds: readonly string[], place: number): string {
   return kind === 'refitted' ? 'all' : kind;
 }
 
-/** Share of the variance beyond noise that is gone; null where there was hardly any. */
-export function goneOf(before: number, after: number, floor: number): number | null {
-  if (before < 1.5 * floor) return null;
-  return (before ** 2 - after ** 2) / (before ** 2 - floor ** 2);
-}
-
-/** Such a share in percent, as the service writes it: “all” for all of it, never rounded up to 100 %. */
+/** A share of the variance beyond noise that is gone, in percent, as the service writes it: “all” for all of it, never rounded up to 100 %. */
 export function goneText(share: number): string {
   return share >= 1 ? 'all' : `${fixed(Math.min(100 * share, 99.9), 1)} %`;
 }

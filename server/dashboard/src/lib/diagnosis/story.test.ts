@@ -59,7 +59,8 @@ it('with the answer the joints that are still red at times are named', () => {
       step: 1,
       duration: 9,
       posture: [],
-      gap: [[], [0, left].map((one) => Array(10).fill(one))],
+      gap: [],
+      square: [[], [0, left].map((one) => Array(10).fill(one ** 2))],
     },
     noise: [1, 1],
   });

@@ -53,11 +53,17 @@ export function nothingNext(found: Pick<DiagnosisData, 'verdict' | 'suspicion' |
   if (found.suspicion) {
     return `Record ${Math.ceil(found.suspicion.seconds)} s more of the same motion: it would show or refute the effect.`;
   }
+  const isDoubted = found.notes_data?.some((note) => note.warning) ?? false;
   if (found.verdict === 'named')
-    return 'Nothing: these records leave no doubt. Use the model with the effect.';
+    return isDoubted
+      ? 'No further record is needed for the name. Read the warnings before you use the model.'
+      : 'Nothing: these records separate the name from every other candidate. Use the model with the effect.';
   if (found.verdict === 'nothing-significant' && examinedJoints(found) !== undefined)
     return 'Diagnose the other joints too: the search was limited.';
-  if (found.verdict === 'nothing-significant') return 'Nothing: the model explains these records.';
+  if (found.verdict === 'nothing-significant')
+    return isDoubted
+      ? 'No experiment is proposed. Read the warnings: no known effect accounts for them.'
+      : 'Nothing: no effect has the evidence to be named.';
   if (found.verdict === 'check-the-record')
     return 'Check what is doubted about the records, then diagnose again.';
   return 'No experiment is proposed. Look at what is left, and at the candidates, below.';

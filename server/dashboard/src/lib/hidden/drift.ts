@@ -18,13 +18,17 @@ const ROUND = [1, 2, 5, 10, 20, 50, 100, 200];
 const HOTTEST = 5;
 const WARM = 1.3;
 
-/** An overlay on an even grid. `posture[joint][index]`, `gap[model][joint][index]`: recorded − simulated. */
+/**
+ * An overlay on an even grid. `posture[joint][index]`, `gap[model][joint][index]`: recorded − simulated, as it is drawn;
+ * `square`: its mean square, which has what trembles too, as the errors of an answer have.
+ */
 export interface Drift {
   readonly joints: readonly number[];
   readonly step: number;
   readonly duration: number;
   readonly posture: readonly (readonly number[])[];
   readonly gap: readonly (readonly (readonly number[])[])[];
+  readonly square: readonly (readonly (readonly number[])[])[];
 }
 
 /** `step`: s between two moments of the grid. */
@@ -38,6 +42,9 @@ export function driftOf(one: Overlay, step = 0.05): Drift {
     duration,
     posture: one.measured.map(even),
     gap: one.residual.map((rows) => rows.map(even)),
+    square: one.residual.map((rows) =>
+      rows.map((row) => even(row.map((value) => (value === null ? null : value ** 2)))),
+    ),
   };
 }
 
@@ -62,7 +69,9 @@ export function armsAt(
   closed: number,
 ): { recorded: number[]; simulated: number[] } {
   const recorded = drift.posture.map((row) => valueAt(row, drift.step, moment));
-  const simulated = recorded.map((value, joint) => value - enlarged * gapAt(drift, joint, moment, closed));
+  const simulated = recorded.map(
+    (value, joint) => value - enlarged * between(drift.gap, drift.step, joint, moment, closed),
+  );
   return { recorded, simulated };
 }
 
@@ -83,16 +92,23 @@ export function timesNoiseAt(
   return drift.joints.map((_, joint) => {
     const steps = Math.round(JUDGED / drift.step);
     const values = Array.from({ length: steps }, (__, back) =>
-      gapAt(drift, joint, Math.max(0, moment - back * drift.step), closed),
+      between(drift.square, drift.step, joint, Math.max(0, moment - back * drift.step), closed),
     );
-    const rms = Math.sqrt(values.reduce((sum, value) => sum + value ** 2, 0) / Math.max(1, steps));
+    const rms = Math.sqrt(values.reduce((sum, value) => sum + value, 0) / Math.max(1, steps));
     return rms / (noise[joint] || Infinity);
   });
 }
 
-function gapAt(drift: Drift, joint: number, moment: number, closed: number): number {
-  const [before, after] = [drift.gap[0]?.[joint] ?? [], drift.gap[1]?.[joint] ?? drift.gap[0]?.[joint] ?? []];
-  return (1 - closed) * valueAt(before, drift.step, moment) + closed * valueAt(after, drift.step, moment);
+/** A value by model and joint at a moment, between that of the first model and that of the second. */
+function between(
+  rows: readonly (readonly (readonly number[])[])[],
+  step: number,
+  joint: number,
+  moment: number,
+  closed: number,
+): number {
+  const [before, after] = [rows[0]?.[joint] ?? [], rows[1]?.[joint] ?? rows[0]?.[joint] ?? []];
+  return (1 - closed) * valueAt(before, step, moment) + closed * valueAt(after, step, moment);
 }
 
 function valueAt(row: readonly number[], step: number, moment: number): number {

@@ -27,6 +27,16 @@ describe('a drift', () => {
     expect(heatAt(drift, [0.001, 0.001], 5, 1)).toEqual([0, 0]);
   });
 
+  it('heats a joint whose difference trembles, although it is drawn where it is on average', () => {
+    const still = overlay(0, 0);
+    const drift = driftOf({
+      ...still,
+      residual: [[TIME.map(() => 0), TIME.map((_, index) => (index % 2 ? 0.01 : -0.01))]],
+    } as unknown as Overlay);
+    expect(heatAt(drift, [0.001, 0.001], 5, 0)).toEqual([0, 1]);
+    expect(armsAt(drift, 5, 20, 0).simulated[1]).toBeCloseTo(2, 1);
+  });
+
   it('of a record without a difference is not enlarged without end', () => {
     expect(enlargementOf(driftOf(overlay(0, 0)))).toBe(200);
   });
