@@ -27,7 +27,7 @@ def test_a_cable_that_is_pulled_makes_everything_stale_and_heals_when_it_is_plug
     expect(page.locator("[data-banner=link]")).to_contain_text(undelivered)
     now = page.get_by_role("region", name="The arm now")
     expect(now).to_contain_text(undelivered)
-    now.get_by_role("button", name="Result of the run").click()
+    now.get_by_role("button", name="Last result").click()
     expect(page.get_by_role("region", name="Result of long")).to_contain_text(undelivered)
     banner = page.get_by_role("banner")
     expect(banner.get_by_text(LIVE).or_(dashboard.degraded)).not_to_be_attached()

@@ -322,7 +322,7 @@ def test_a_run_that_ended_on_live_is_what_the_form_is_filled_with(dashboard: Das
     ramp = {"kind": "ramp", "amplitude": 0.05, "duration": 1.25}
     spec = {"name": "slow", "trajectory": ramp, "hold": 0.1}
     dashboard.service.end_of(dashboard.service.robot.post("/experiments", json={"spec": spec}).json()["id"])
-    page.get_by_role("button", name="Result of the run").click()
+    page.get_by_role("button", name="Last result").click()
     page.get_by_role("button", name="Edit and run again").click()
     expect(page.get_by_role("textbox", name="Duration")).to_have_value("1.25")
     expect(page).to_have_url(re.compile("#/experiments$"))

@@ -54,7 +54,7 @@ def test_an_experiment_is_seen_to_run_and_its_motion_in_the_numbers(dashboard: D
     expect(page.get_by_text("Nothing is running or waiting.")).to_be_visible()
     expect(page.get_by_role("banner").get_by_text("moving")).not_to_be_attached()
     assert abs(_number(_cell(page, 1, 0)) - before) > 2
-    result = page.get_by_role("button", name="Result of the run")
+    result = page.get_by_role("button", name="Last result")
     expect(result).to_be_visible()
     assert page.evaluate(top) == place  # the end of a run moves nothing from under a hand
     result.click()
