@@ -12,6 +12,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine
 from model import layout as at
 from model.fitting.options import FitOptions, Prior
+from model.fitting.phases import phase_unknowns
 from model.fitting.records import Record, Signal
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
@@ -59,18 +60,22 @@ def chosen_unknowns(model: Model, options: FitOptions) -> tuple[Unknown, ...]:
 
 
 def with_nuisances(
-    model: Model, records: Sequence[Record], options: FitOptions, signal: Signal
+    model: Model, records: Sequence[Record], options: FitOptions, signal: Signal, first: int = 1
 ) -> tuple[Model, tuple[Unknown, ...]]:
     """Returns the model with everything that its nuisances need, and these: numbers that matter to records, and that
-    neither a machine file states nor a model keeps. None for Nelder–Mead, which is the source's."""
+    neither a machine file states nor a model keeps. None for Nelder–Mead, which is the source's.
+
+    first: index of the first record in which disturbances have a phase of their own, as in `phase_unknowns`.
+    """
     if options.method == "nelder_mead":
         return model, ()
     wider, bends = with_bends(model, options, signal)
     forms = friction_forms(wider) if options.friction_form else ()
+    phases = phase_unknowns(model, len(records), first)
     if not options.start_posture or signal != "position":
-        return wider, (*bends, *forms)
+        return wider, (*bends, *forms, *phases)
     postures = start_postures(model.machine, records, any(use.name == BEND for use in wider.effects))
-    return wider, (*bends, *forms, *postures)
+    return wider, (*bends, *forms, *postures, *phases)
 
 
 def with_bends(model: Model, options: FitOptions, signal: Signal) -> tuple[Model, tuple[Unknown, ...]]:

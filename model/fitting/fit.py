@@ -70,7 +70,7 @@ def fit(
     options, cancel, begun = options or FitOptions(), cancel or Never(), time.perf_counter()
     record = check_records(model, traces, torques=False)
     require_computable(record)
-    problem = fit_problem(model, traces, options)
+    problem = fit_problem(model, traces, options).with_phases_begun()
     coordinates = coordinates_of(problem.model, problem.unknowns, options)
     before = problem.evaluate(_starts(problem), derivatives=False)
     solution = _first_search(problem, coordinates, options, progress, cancel)

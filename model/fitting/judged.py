@@ -1,7 +1,8 @@
 """What a model leaves of records beside its nuisances, and what noise alone would leave.
 
-A start posture within the sensor's error, a potentiometer's bend within its linearity and the form of friction near
-rest belong to no model: no machine file states them, and no fit keeps them. A right model needs them all the same: on a
+A start posture within the sensor's error, a potentiometer's bend within its linearity, the form of friction near rest
+and the phase of a disturbance belong to no model: no machine file states them, and no fit keeps them. A right model
+needs them all the same: on a
 ramp of the mock the form of friction alone moves the place where a joint comes to rest by two counts. So they are
 fitted to the records, with all numbers of the model held, before its residual is compared with noise.
 
@@ -52,10 +53,10 @@ def left_beside_nuisances(model: Model, traces: Sequence[Trace]) -> list[JointLe
     options = FitOptions()
     loop: Loop = "open" if isinstance(model.machine.controller, NoController) else "closed"
     records = records_of(as_used(traces, model.machine, loop), model.machine, "position")
-    wider, nuisances = with_nuisances(model, records, options, "position")
+    wider, nuisances = with_nuisances(model, records, options, "position", first=0)
     floor = noise_floor(records, model.machine, "position")
-    problem = SimulatedProblem(wider, records, nuisances, floor, "position", loop, options.step)
-    values = np.array([u.start for u in nuisances])
+    problem = SimulatedProblem(wider, records, nuisances, floor, "position", loop, options.step).with_phases_begun()
+    values = np.array([u.start for u in problem.unknowns])
     if nuisances:
         search = Search(options.robust, options.tolerance, MOST_EVALUATIONS)
         values = solve(problem, [white(d) for d in floor], values, Never(), search, None).values

@@ -20,12 +20,13 @@ SIZE = 0.5
 """Natural size of a change of a phase, rad."""
 
 
-def phase_unknowns(model: Model, records: int) -> tuple[Unknown, ...]:
-    """Returns the phase, rad, of every disturbance of a model in every record but the first."""
+def phase_unknowns(model: Model, records: int, first: int = 1) -> tuple[Unknown, ...]:
+    """Returns the phase, rad, of every disturbance of a model in every record from `first` on: 1 where sine and cosine
+    are fitted to the same records, 0 where they are of others."""
     return tuple(
         Unknown(_phase(sine, record), 0.0, nuisance=True, trace=record, size=SIZE)
         for sine, _ in model.disturbances
-        for record in range(1, records)
+        for record in range(first, records)
     )
 
 
@@ -47,6 +48,24 @@ def turned_pairs(model: Model, values: Mapping[str, float], record: int) -> list
             )
             found += zip(pair, turned, strict=True)
     return found
+
+
+def turned_direction(
+    model: Model, values: Mapping[str, float], record: int, parameter: Parameter
+) -> dict[int, float] | None:
+    """Returns how the slots of a record's disturbance change with its sine, its cosine or its phase in that record.
+
+    None for other parameters, and where the record has no phase among `values`.
+    """
+    for sine, cosine in model.disturbances:
+        phase = _phase(sine, record).name
+        if phase not in values or parameter.name not in (sine.name, cosine.name, phase):
+            continue
+        turn = np.exp(1j * values[phase])
+        pair = values.get(sine.name, sine.value) + 1j * values.get(cosine.name, cosine.value)
+        change = turn * (1j * pair if parameter.name == phase else 1.0 if parameter.name == sine.name else 1j)
+        return {**dict.fromkeys(sine.slots, change.real), **dict.fromkeys(cosine.slots, change.imag)}
+    return None
 
 
 def phases_of(signals: Sequence[Floats], times: Sequence[Floats], rate: float) -> list[float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -11,6 +12,7 @@ import numpy as np
 
 from daq.contracts.errors import SpecError
 from model.arrays import Floats
+from model.fitting.phases import is_phase, turned_direction, turned_pairs
 from model.fitting.problem import Evaluation
 from model.fitting.records import Record, Signal
 from model.fitting.unknowns import Unknown
@@ -72,13 +74,28 @@ class SimulatedProblem:
             replace(p, noise=deviations * rng.standard_normal(p.noise.shape))
             for p in (prepare(self.model, record.inputs, options) for record in self.records)
         ]
-        vector, initials = self._state(values)
-        count = len(prepared)
-        vectors = np.tile(vector, (count, 1))
-        out = BatchRun(self.model, prepared, np.arange(count), vectors, np.array(initials), self.step).run()
+        vectors, initials = self._state(values)
+        out = BatchRun(self.model, prepared, np.arange(len(prepared)), vectors, initials, self.step).run()
         if not np.isfinite(out).all():
             raise SpecError("a simulation with noise does not stay finite: the control loop is unstable")
         return [at_rows(out[t, OUT_READING, : len(r.inputs)], r.inputs.rows) for t, r in enumerate(self.records)]
+
+    def with_phases_begun(self) -> SimulatedProblem:
+        """Returns the problem with the phase of each disturbance in a record begun at the quarter turn that fits best.
+
+        A search that begins on the wrong half of a turn ends without the disturbance.
+        """
+        problem, values = self, np.array([u.start for u in self.unknowns])
+        for k, unknown in enumerate(self.unknowns):
+            if not is_phase(unknown) or unknown.trace is None:
+                continue
+            costs = []
+            for quarter in range(4):
+                values[k] = quarter * math.pi / 2.0
+                costs.append(float((problem.evaluate(values, derivatives=False)[unknown.trace].residual ** 2).sum()))
+            values[k] = int(np.argmin(costs)) * math.pi / 2.0
+        begun = tuple(replace(u, start=float(v)) for u, v in zip(self.unknowns, values, strict=True))
+        return replace(self, unknowns=begun)
 
     @cached_property
     def _prepared(self) -> list[Prepared]:
@@ -105,13 +122,18 @@ class SimulatedProblem:
         return found
 
     def _simulate(self, values: Floats, derivatives: bool) -> list[_Simulated]:
-        vector, initials = self._state(values)
+        vectors, initials = self._state(values)
         count, column = len(self.records), OUT_SPEED if self.signal == "velocity" else OUT_READING
-        vectors, starts = np.tile(vector, (count, 1)), np.array(initials)
-        batch = BatchRun(self.model, self._prepared, np.arange(count), vectors, starts, self.step, outputs=(column,))
+        batch = BatchRun(self.model, self._prepared, np.arange(count), vectors, initials, self.step, outputs=(column,))
         free = [[k for k, u in enumerate(self.unknowns) if u.trace is None or u.trace == t] for t in range(count)]
         if derivatives:
-            runs = batch.derivatives([[self.unknowns[k].parameter for k in own] for own in free])
+            named = self._named(values)
+            runs = batch.derivatives(
+                [
+                    [turned_direction(self.model, named, t, p) or p for p in (self.unknowns[k].parameter for k in own)]
+                    for t, own in enumerate(free)
+                ]
+            )
         else:
             runs = [(out, np.zeros(0)) for out in batch.run()]
         found = []
@@ -127,14 +149,20 @@ class SimulatedProblem:
             found.append(_Simulated(at_rows(simulated, rows), jacobian))
         return found
 
-    def _state(self, values: Floats) -> tuple[Floats, list[Floats]]:
-        """Returns the flat vector and initial states for values of the unknowns."""
-        vector = self.model.vector.copy()
-        initials = [record.inputs.initial.copy() for record in self.records]
+    def _named(self, values: Floats) -> dict[str, float]:
+        return {u.name: float(v) for u, v in zip(self.unknowns, values, strict=True)}
+
+    def _state(self, values: Floats) -> tuple[Floats, Floats]:
+        """Returns the flat vector and the initial state of each record for values of the unknowns."""
+        vectors = np.tile(self.model.vector, (len(self.records), 1))
+        initials = np.array([record.inputs.initial for record in self.records])
         for value, unknown in zip(values, self.unknowns, strict=True):
             place = unknown.parameter.initial
-            vector[list(unknown.parameter.slots)] = value
+            vectors[:, list(unknown.parameter.slots)] = value
             if place is not None:
                 for t in range(len(initials)) if unknown.trace is None else (unknown.trace,):
                     initials[t][place] += value
-        return vector, initials
+        for t, vector in enumerate(vectors):
+            for p, value in turned_pairs(self.model, self._named(values), t):
+                vector[list(p.slots)] = value
+        return vectors, initials

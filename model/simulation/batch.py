@@ -7,7 +7,7 @@ import gc
 import math
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -36,6 +36,8 @@ LARGEST_PIECE = 2**22
 """Most memory (bytes) for the outputs of a piece, so that large batches stay within the caches."""
 LANES_FROM = 256
 """Least number of runs that go in lanes. Fewer are done before the compiled code for lanes is loaded."""
+Direction = Parameter | Mapping[int, float]
+"""What a derivative is taken by: a parameter, or changes of slots of the model's vector."""
 
 
 @dataclass(frozen=True)
@@ -87,10 +89,11 @@ class BatchRun:
         self._run(tag, self.which[groups[:, 0]], arrays, place, cores)
         return found
 
-    def derivatives(self, by: Sequence[Sequence[Parameter]], cores: int | None = None) -> list[tuple[Floats, Floats]]:
-        """Returns for each run its outputs (outputs, k, n) and their derivatives (p, outputs, k, n) by p parameters.
+    def derivatives(self, by: Sequence[Sequence[Direction]], cores: int | None = None) -> list[tuple[Floats, Floats]]:
+        """Returns for each run its outputs (outputs, k, n) and their derivatives (p, outputs, k, n) in p directions.
 
-        by: parameters of the model or of the initial state, for each run. A run in dual numbers carries `WIDTH`.
+        by: parameters of the model or of the initial state, or changes of slots of the model's vector, for each run. A
+        run in dual numbers carries `WIDTH`.
         """
         parts = [(r, own[i : i + WIDTH]) for r, own in enumerate(by) for i in range(0, max(1, len(own)), WIDTH)]
         runs = np.array([r for r, _ in parts])
@@ -229,11 +232,14 @@ def _last(grouped: Floats) -> Floats:
     return np.ascontiguousarray(np.moveaxis(grouped, 1, -1))
 
 
-def seed(parameter: Parameter, vector: Floats, initial: Floats) -> None:
-    """Sets the derivatives of the vector and initial state of a run by the parameter to 1 in its places."""
-    vector[list(parameter.slots)] = 1.0
-    if parameter.initial is not None:
-        initial[parameter.initial] = 1.0
+def seed(direction: Direction, vector: Floats, initial: Floats) -> None:
+    """Sets the derivatives of the vector and initial state of a run in a direction: 1 in the places of a parameter."""
+    if isinstance(direction, Mapping):
+        vector[list(direction)] = list(direction.values())
+        return
+    vector[list(direction.slots)] = 1.0
+    if direction.initial is not None:
+        initial[direction.initial] = 1.0
 
 
 def available_cores() -> int:

@@ -26,6 +26,7 @@ from model.drives import controller as pid
 from model.effects.effect import JointScale, Tone
 from model.fitting.fit import fit_problem
 from model.fitting.options import FitOptions, Prior
+from model.fitting.phases import is_phase
 from model.fitting.records import Record
 from model.fitting.simulated import SimulatedProblem
 from model.fitting.unknowns import Unknown
@@ -286,7 +287,7 @@ def observe(
         for r in problem.records
     )
     given = {p.name: p.value for p in model.parameters if p.effect is not None}
-    unknowns = tuple(_as_diagnosed(u, given, problem.model) for u in problem.unknowns)
+    unknowns = tuple(_as_diagnosed(u, given, problem.model) for u in problem.unknowns if not is_phase(u))
     scales = _recorded_scales(model, problem.records)
     observation = Observation(model.machine, problem.records, problem.floor, unit, prepared, scales)
     return observation, problem.model, unknowns

@@ -1,16 +1,20 @@
 """What a model leaves of records, beside what belongs to no model, and beside what noise would leave."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.comparison.compare import compare
+from model.discrepancy.engine.priors import free_unknown
 from model.fitting.choice import SHAPE_DEVIATION, friction_forms
 from model.fitting.fit import fit
 from model.fitting.judged import left_beside_nuisances, noise_left
 from model.fitting.options import FitOptions
+from model.fitting.phases import phase_unknowns
 from model.fitting.records import noise_floor, records_of
 from model.fitting.simulated import SimulatedProblem
 from model.machine_model.model import Model
@@ -81,3 +85,43 @@ def test_a_rounded_simulation_is_compared_with_the_noise_of_both_roundings() -> 
     for options in (Options(quantise=True), None):
         joints = compare([("it", arm())], records, options=options).models[0].traces[0].joints
         assert all(0.85 < j.rmse / j.floor < 1.15 for j in joints), options
+
+
+# ---- A disturbance of an arm that stays on: every record begins at a phase of its own
+
+SIZE, RATE = 4.0, 1.3
+
+
+def disturbed(phase: float) -> Model:
+    numbers = {"sine": SIZE * math.cos(phase), "cosine": SIZE * math.sin(phase), "frequency": RATE}
+    return arm().with_effect("periodic_disturbance", (2,), numbers)
+
+
+def test_derivatives_by_a_phase_and_by_what_it_turns_are_those_of_differences() -> None:
+    model, records = disturbed(0.4), records_of(traces(disturbed(0.4), 2, 3.0), arm().machine, "position")
+    own = [free_unknown(p) for pair in model.disturbances for p in pair]
+    unknowns = (*own, *phase_unknowns(model, 2))
+    problem = SimulatedProblem(model, records, unknowns, noise_floor(records, arm().machine, "position"))
+    values = np.array([*(u.start for u in own), 0.9])
+    slopes = [e.jacobian for e in problem.evaluate(values, derivatives=True)]
+    for k, step in enumerate((1e-4, 1e-4, 1e-5)):
+        low, high = (problem.evaluate(values + s * step * np.eye(3)[k], derivatives=False) for s in (-1, 1))
+        for t in range(2):
+            difference = (high[t].residual - low[t].residual) / (2 * step)
+            np.testing.assert_allclose(slopes[t][k], difference, atol=2e-3 * np.abs(difference).max() + 1e-9)
+    assert np.abs(slopes[0][2]).max() == 0.0  # the first record's phase is that of sine and cosine
+
+
+def test_a_disturbance_is_explained_at_any_phase() -> None:
+    """Fitted to two records of other phases, and validated on a third."""
+    given = [trace(disturbed(phase), number) for number, phase in enumerate((0.3, 2.9, -1.8))]
+    begun = arm().with_effect("periodic_disturbance", (2,), {"sine": 3.0, "cosine": 0.0, "frequency": RATE})
+    names = tuple(f"joint2.periodic_disturbance.{part}" for part in ("sine", "cosine", "frequency"))
+    found = fit(begun, given[:2], FitOptions(parameters=names, replicas=2, rounds=1))
+    size = math.hypot(*(found.parameter(name).value for name in names[:2]))
+    assert size == pytest.approx(SIZE, abs=0.3)
+    assert found.verdict.explains
+    assert not any("phase" in one.name for one in found.parameters)
+    assert in_noises(found.model, given[2:]).max() < 1.3
+    bare = compare([("fitted", found.model)], given[2:]).models[0].traces[0].joints[1]
+    assert bare.rmse > 2.0 * bare.floor
