@@ -28,7 +28,9 @@ JOINTS_ABREAST = 3
 """Joints side by side. Further joints get another band of panels, so that the figure fits a page."""
 
 _ALARMS: frozenset[str] = frozenset({"limit", "restart", "link_lost", "stop", "fault"})
-_UNMARKED: frozenset[str] = frozenset({"start", "end", "note", "gains", "retry", "missing", "missed_set_point"})
+_UNMARKED: frozenset[str] = frozenset(
+    {"start", "end", "note", "waypoint", "gains", "retry", "missing", "missed_set_point"}
+)
 """Kinds of event that are not marked: there may be hundreds of them, or the axes already show them."""
 _MOTIONS: frozenset[str] = frozenset({"ramp_start", "ramp_end"})
 """The ends of a motion, whose messages name the motion: "sine ends"."""

@@ -42,6 +42,7 @@ EventKind = Literal[
     "ramp_start",  # of any motion
     "ramp_end",
     "reversal",  # the motion changes direction
+    "waypoint",  # a named moment of the motion: a via point, a repeat, the ends of a slow move
     "gains",  # changed for this run, or restored
     "limit",  # a set point waits for a joint at its following-error limit
     "pause",  # set points wait
@@ -59,7 +60,7 @@ EventKind = Literal[
 
 
 SLOW_LINE = "slow line: "
-"""Prefix of the note that not every control period is sampled. It is shown even where other notes are hidden."""
+"""Prefix of the note that not every control period is sampled."""
 INCOMPLETE = "INCOMPLETE: "
 """Prefix of the note about data that an imported file announces but lacks."""
 LATE_SET_POINTS = "late_set_points"

@@ -30,7 +30,7 @@ class _AlarmReporter:
     def event(self, time: float, kind: EventKind, message: str, tick: int | None, joint: int | None = None) -> None:
         """Reports an alarm in one line."""
         del time, tick, joint
-        if kind not in ("start", "end", "note", "ramp_start", "ramp_end"):
+        if kind not in ("start", "end", "note", "waypoint", "ramp_start", "ramp_end"):
             self._tell(message)
 
 

@@ -55,5 +55,5 @@ def move_piece(way: Floats, period: float, speeds: Floats) -> Piece:
         return smooth_piece(np.zeros((0, len(way))))
     duration = PEAK_SPEED * float((np.abs(way) / speeds).max())
     fraction = rest_to_rest(sample_times(duration, period) / duration)
-    marks = (Mark(0, "note", "slow move starts"), Mark(len(fraction), "note", "slow move ends"))
+    marks = (Mark(0, "waypoint", "slow move starts"), Mark(len(fraction), "waypoint", "slow move ends"))
     return smooth_piece(fraction[:, None] * way, marks)

@@ -50,8 +50,8 @@ def pick_and_place(
     time = sample_times(float(durations.sum()), period)
     marks = (
         Mark(0, "ramp_start", "picking starts"),
-        Mark(periods_in(move.pick, period), "note", "lift-off point"),
-        Mark(periods_in(move.pick + move.travel, period), "note", "set-down point"),
+        Mark(periods_in(move.pick, period), "waypoint", "lift-off point"),
+        Mark(periods_in(move.pick + move.travel, period), "waypoint", "set-down point"),
         Mark(len(time), "ramp_end", "placed"),
     )
     return smooth_piece(evaluate(polynomials(knots, durations), durations, time), marks)

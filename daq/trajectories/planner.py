@@ -114,7 +114,9 @@ def _with_repeats(spec: ExperimentSpec, machine: Machine, motion: Piece, period:
         if repeat > 1:
             pieces.append(back)
         if spec.repeats > 1:
-            pieces.append(smooth_piece(np.zeros((0, count)), (Mark(0, "note", f"repeat {repeat} of {spec.repeats}"),)))
+            pieces.append(
+                smooth_piece(np.zeros((0, count)), (Mark(0, "waypoint", f"repeat {repeat} of {spec.repeats}"),))
+            )
         pieces += [settle, motion, hold]
     return join_pieces(pieces, count, period)
 

@@ -16,7 +16,7 @@ from daq.contracts.machine import Machine, NoController
 from daq.contracts.trace import Floats, Integers
 
 Booleans = NDArray[np.bool_]
-MarkKind = Literal["start", "ramp_start", "ramp_end", "reversal", "note", "end"]
+MarkKind = Literal["start", "ramp_start", "ramp_end", "reversal", "waypoint", "end"]
 
 
 @dataclass(frozen=True)

@@ -108,7 +108,7 @@ def via(move: Via, points: Floats, period: float) -> Piece:
     spline = CubicSpline(knots, np.concatenate([np.zeros((1, points.shape[1])), points]), bc_type="clamped")
     time = np.minimum(sample_times(float(knots[-1]), period), knots[-1])
     passed = tuple(
-        Mark(periods_in(at, period), "note", f"via point {number} of {len(points) - 1}")
+        Mark(periods_in(at, period), "waypoint", f"via point {number} of {len(points) - 1}")
         for number, at in enumerate(knots[1:-1].tolist(), start=1)
     )
     marks = (Mark(0, "ramp_start", "via points start"), *passed, Mark(len(time), "ramp_end", "via points end"))

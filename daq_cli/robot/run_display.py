@@ -32,12 +32,11 @@ class RunDisplay:
         left out."""
         from rich.text import Text
 
-        from daq.contracts.limp import GAINS_UNKNOWN
-        from daq.contracts.trace import LATE_WORDS, SLOW_LINE
+        from daq.contracts.trace import LATE_WORDS
 
         if LATE_WORDS in message:
             return
-        if kind not in self._quiet or message.startswith((SLOW_LINE, GAINS_UNKNOWN)):
+        if kind not in self._quiet:
             line = printable(f"  {kind.replace('_', ' ')}: {message}")
             self._bar.console.print(Text.assemble((f"{time:8.2f} s", "dim"), line), soft_wrap=True)
 
@@ -47,6 +46,6 @@ def run_display(spec: ExperimentSpec) -> Iterator[RunDisplay]:
     """Shows a run within the block; the bar is removed at its end, and absent without a terminal."""
     kind = spec.trajectory.kind
     # A sequence has dozens of marks; they are in the trace.
-    marks = {"note", "ramp_start", "ramp_end", "reversal"} if kind == "sequence" else set()
+    marks = {"waypoint", "ramp_start", "ramp_end", "reversal"} if kind == "sequence" else set()
     with terminal_bar(console()) as bar:
         yield RunDisplay(bar, kind, frozenset({"start", "end"} | marks))

@@ -7,6 +7,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator, Sequence
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import IO, Literal, TypeVar
 from urllib.parse import urlsplit
@@ -128,7 +129,7 @@ class Camera:
         """Takes pictures as long as they are needed. Raises CameraError if the source ends."""
         for one in self._source():
             self.problem = ""
-            self._take(Picture(time.monotonic(), one))
+            self._take(one)
             if self._closing.is_set() or not self._is_needed():
                 return
         if not self._closing.is_set():
@@ -137,8 +138,8 @@ class Camera:
     def _is_needed(self) -> bool:
         return self.records or time.monotonic() - self._asked < WATCHED
 
-    def _source(self) -> Iterator[bytes]:
-        """Yields pictures at the configured rate at most."""
+    def _source(self) -> Iterator[Picture]:
+        """Yields pictures at the configured rate at most. One that is drawn is as old as its posture."""
         period = 1.0 / self._settings.rate
         if self._kind == "synthetic":
             drawn: LiveSample | None = None
@@ -149,12 +150,15 @@ class Camera:
                 if sample is drawn:
                     continue  # an old posture makes no new picture: the last one grows old
                 drawn = sample
-                yield picture(self._rig.robot.machine, sample.position, f"tick {sample.tick}")
+                at = datetime.now().astimezone() - timedelta(seconds=time.monotonic() - sample.host_time)
+                label = f"{at:%H:%M:%S}.{at.microsecond // 100_000} {at:%Z} · tick {sample.tick}"
+                yield Picture(sample.host_time, picture(self._rig.robot.machine, sample.position, label))
             return
         if self._kind == "webrtc":
-            yield from map(jpeg, _thinned(frames(self.url), period))
+            found: Iterator[bytes] = map(jpeg, _thinned(frames(self.url), period))
         else:
-            yield from _thinned(pictures(self.url), period)
+            found = _thinned(pictures(self.url), period)
+        yield from (Picture(time.monotonic(), one) for one in found)
 
     def _take(self, one: Picture) -> None:
         with self._lock:

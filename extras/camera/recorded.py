@@ -41,7 +41,7 @@ MARGIN = 0.5
 
 @dataclass(frozen=True)
 class Picture:
-    """A JPEG, and when it arrived (s, the host's monotonic clock)."""
+    """A JPEG, and when it arrived, or its posture was measured (s, the host's monotonic clock)."""
 
     time: float
     jpeg: bytes

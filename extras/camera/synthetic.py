@@ -39,7 +39,7 @@ def picture(machine: Machine, position: Sequence[float], label: str) -> bytes:
     draw.line(points, fill=ARM, width=14, joint="curve")
     for x, y in points[1:]:
         draw.ellipse((x - 6, y - 6, x + 6, y + 6), fill=JOINT)
-    draw.text((10, HEIGHT - 22), f"synthetic camera · {label}", fill=INK)
+    draw.text((10, HEIGHT - 26), f"synthetic camera · {label}", fill=INK, font_size=16)
     stream = io.BytesIO()
     image.save(stream, "JPEG", quality=QUALITY)
     return stream.getvalue()

@@ -105,6 +105,11 @@ class Ending:
     left_out: Answer | None = None
 
     @property
+    def word(self) -> str:
+        """How a person says it: a run that left a part of its trace was not just cancelled."""
+        return "stopped" if self.outcome == "stopped" else advance("running", self.event)
+
+    @property
     def pauses_queue(self) -> bool:
         """Whether a person must look at the arm before the next experiment runs: always, except after a completed plan
         with its trace in the catalogue, or a plan refused before anything moved."""

@@ -11,7 +11,7 @@ from datetime import datetime, timedelta
 
 from daq.contracts.consent import lacks_consent
 from daq.contracts.errors import DaqError
-from daq.contracts.service.experiments import Experiment, ExperimentRequest, ExperimentState, Schedule
+from daq.contracts.service.experiments import Experiment, ExperimentRequest, Schedule
 from daq.contracts.service.queue import QueueStatus
 from daq.owner.messages import Answer, ArmReport, EventHappened, HaltRun, Opened, Progress, Report, RunExperiment
 from server.access.caller import spoken
@@ -411,17 +411,16 @@ class QueueService:
             context.control.give_back_for_queue()
         with self._lock:
             ending = self._with_stop_reason(ending, self.running)
-            state = advance("running", ending.event)
             reason = _joined(ending.reason, "its trace is not in the catalogue yet" if ending.left_out else "")
             because = f"{reason}. " if reason else ""
-            why = f"{because}The run {_ended_as(experiment, state)}: look at the arm, then resume the queue"
+            why = f"{because}The run {_ended_as(experiment, ending.word)}: look at the arm, then resume the queue"
             # first, so that clients that learn of the end find the queue paused
             paused = ending.pauses_queue and self._pause(why)
             self._ended = Ended(experiment.id, ending, context.clock.utc())
             try:
                 self._write_end()
             except Exception:
-                log.exception("experiment %s: its end as %s is not written yet", experiment.id, state)
+                log.exception("experiment %s: its end as %s is not written yet", experiment.id, ending.word)
                 paused = self._pause(why) or paused
             finally:
                 self.running = None
@@ -441,7 +440,7 @@ class QueueService:
         except (IllegalEventError, ProblemError):
             log.exception("experiment %s", ended.id)  # it has an end already, or was deleted: nothing to write
         self._ended = None
-        what = "completed" if ending.event is Event.COMPLETED else state
+        what = "completed" if ending.event is Event.COMPLETED else ending.word
         context.record_event("experiment", f"{what}: {reason}".rstrip(": "), experiment=ended.id)
         context.ended(ended.id, state, reason)
 
@@ -520,7 +519,7 @@ def _joined(*lines: str) -> str:
     return "; ".join(line for line in lines if line)
 
 
-def _ended_as(experiment: Experiment, state: ExperimentState) -> str:
+def _ended_as(experiment: Experiment, word: str) -> str:
     """Returns a line such as `ramp failed`: people know an experiment by its name, not by its ID."""
     name = experiment.spec.name or experiment.spec.trajectory.kind.replace("_", " ")
-    return f"{name} {state}" if state == "failed" else f"{name} was {state}"
+    return f"{name} {word}" if word == "failed" else f"{name} was {word}"

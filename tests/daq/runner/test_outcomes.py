@@ -114,7 +114,7 @@ def test_repeated_requests_are_told_once_each(tmp_path: Path) -> None:
 
 def test_a_stop_on_the_way_to_the_start_leaves_a_frozen_arm_and_no_trace(arm: Rig, tmp_path: Path) -> None:
     far = SHORT.model_copy(update={"start": {1: math.radians(200)}})
-    arm.ears.at_event["note"] = arm.stop_as_the_guardian_does  # "slow move starts"
+    arm.ears.at_event["waypoint"] = arm.stop_as_the_guardian_does  # "slow move starts"
     with pytest.raises(StoppedError, match=r"move to the start.*on request.*nothing was recorded"):
         arm.run(far)
     state = arm.ask("state")
@@ -210,7 +210,7 @@ def test_a_memory_that_is_always_busy_is_a_fault(arm: Rig) -> None:
 
 def test_a_fault_on_the_way_to_the_start_is_told_and_nothing_recorded(arm: Rig, tmp_path: Path) -> None:
     far = SHORT.model_copy(update={"start": {1: math.radians(270)}})
-    arm.ears.at_event["note"] = lambda: arm.ask("fault_on", fault="stalled_joint:joint=1")
+    arm.ears.at_event["waypoint"] = lambda: arm.ask("fault_on", fault="stalled_joint:joint=1")
     with pytest.raises(RunFaultError, match=r"move to the start .* joint 1.*nothing was recorded"):
         arm.run(far)
     assert arm.ask("state")["frozen"]
@@ -306,9 +306,9 @@ def test_what_ends_the_wait_for_a_joint_to_arrive(
     arm.ask("fault_on", fault="stalled_joint:joint=1")
 
     def at_the_end() -> None:
-        arm.ears.at_event["note"] = lambda: happens(arm)
+        arm.ears.at_event["waypoint"] = lambda: happens(arm)
 
-    arm.ears.at_event["note"] = at_the_end
+    arm.ears.at_event["waypoint"] = at_the_end
     with pytest.raises(error, match=line):
         arm.run(near)
     arm.ask("reconnect")

@@ -26,7 +26,7 @@ def test_via_points_pass_their_times_and_are_checked_like_all_motions() -> None:
     speed, acceleration = np.diff(moved, axis=0), np.diff(moved, 2, axis=0)
     assert np.abs(speed[[0, -1]]).max() < 0.05 * np.abs(speed).max(), "at rest at both ends"
     assert np.abs(np.diff(acceleration, axis=0)).max() < 0.1 * np.abs(acceleration).max(), "without a jerk between"
-    assert [(m.index, m.message) for m in made.marks if m.kind == "note"] == [
+    assert [(m.index, m.message) for m in made.marks if m.kind == "waypoint"] == [
         (50, "via point 1 of 2"),
         (80, "via point 2 of 2"),
     ]
@@ -89,7 +89,7 @@ def test_a_pick_and_place_passes_above_both_places_and_is_at_rest_at_its_ends() 
     assert made.angles[-1, :3] - made.angles[0, :3] == pytest.approx(list(OVER.values()), abs=1e-12)
     assert (ends[:, 2] >= min(ends[0, 2], ends[-1, 2]) - 1e-3).all()
     assert check_plan(made, MA2000, MA2000.limits) == []
-    assert [(m.index, m.message) for m in made.marks if m.kind == "note"] == [
+    assert [(m.index, m.message) for m in made.marks if m.kind == "waypoint"] == [
         (50, "lift-off point"),
         (150, "set-down point"),
     ]

@@ -155,7 +155,7 @@ def test_the_synthetic_picture_shows_the_posture() -> None:
     assert np.mean(np.abs(np.asarray(rest, float) - np.asarray(moved, float))) > 1
 
 
-def test_an_old_posture_makes_no_new_picture() -> None:
+def test_an_old_posture_makes_no_new_picture_and_one_as_old_as_it_is() -> None:
     class Looks:
         """Ends a camera after so many looks at its samples."""
 
@@ -168,6 +168,6 @@ def test_an_old_posture_makes_no_new_picture() -> None:
     place = SimpleNamespace(name="ma2000", url="mock://")
     robot = SimpleNamespace(place=place, machine=MACHINE, experiment=None)
     camera: Any = Camera(cast(Any, SimpleNamespace(robot=robot)), CameraSettings())
-    camera.heard(SimpleNamespace(position=[0.0, 1.5, 0.0, 0.0, 0.0, 0.0], tick=7))
+    camera.heard(SimpleNamespace(position=[0.0, 1.5, 0.0, 0.0, 0.0, 0.0], tick=7, host_time=12.5))
     camera._closing = Looks()
-    assert len(list(camera._source())) == 1
+    assert [one.time for one in camera._source()] == [12.5]

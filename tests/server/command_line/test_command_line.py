@@ -40,7 +40,7 @@ def test_a_run_does_what_the_local_command_does(daq: Daq, tmp_path: Path) -> Non
     assert trace.record.spec.joints == (1, 2, 3)
     assert f"complete: {len(trace)} samples" in lines[0]
     marks = [line.split("s  ", 1)[1] for line in said.err.splitlines() if " s  " in line]
-    assert [mark.split(":")[0] for mark in marks] == ["note", "note", "ramp start", "ramp end"], said.err
+    assert [mark.split(":")[0] for mark in marks] == ["waypoint", "waypoint", "ramp start", "ramp end"], said.err
 
 
 def test_its_result_as_json_and_a_dry_run_are_the_same_too(

@@ -55,6 +55,18 @@ def test_a_program_is_there_after_another_page_and_another_control(dashboard: Da
     assert robot.get("/programs").json() == []
 
 
+def test_taking_control_stretches_no_chart(dashboard: Dashboard) -> None:
+    page = dashboard.until_live()
+    charts = page.locator(".place[data-kind=charts]")
+    before = charts.evaluate("one => one.offsetHeight")
+    page.get_by_role("button", name="Take control").click()
+    expect(page.get_by_role("group", name="Jog:")).to_be_visible()
+    assert charts.evaluate("one => one.offsetHeight") == before
+    page.get_by_role("button", name="Release control").click()
+    expect(page.get_by_role("group", name="Jog:")).not_to_be_attached()
+    assert charts.evaluate("one => one.offsetHeight") == before
+
+
 def test_gains_are_changed_and_read_back_and_jogging_is_beside_the_arm(dashboard: Dashboard, controlled: Page) -> None:
     panel = controlled.locator("section").filter(has=controlled.get_by_text("This browser shows no 3-D"))
     expect(panel.get_by_role("group", name="Jog:")).to_be_visible()

@@ -27,7 +27,8 @@ def test_a_cable_that_is_pulled_makes_everything_stale_and_heals_when_it_is_plug
     expect(page.locator("[data-banner=link]")).to_contain_text(undelivered)
     now = page.get_by_role("region", name="The arm now")
     expect(now).to_contain_text(undelivered)
-    expect(page.get_by_role("region", name="The run that just ended")).to_contain_text(undelivered)
+    now.get_by_role("button", name="Last result").click()
+    expect(page.get_by_role("region", name="Result of long")).to_contain_text(undelivered)
     banner = page.get_by_role("banner")
     expect(banner.get_by_text(LIVE).or_(dashboard.degraded)).not_to_be_attached()
     expect(page.get_by_text("stale:")).to_be_visible()
@@ -46,3 +47,20 @@ def test_a_service_that_hangs_is_missed_and_found_again(dashboard: Dashboard) ->
     expect(page.get_by_text("No connection to the service.")).not_to_be_attached()
     expect(page.get_by_role("banner").get_by_text(LIVE).or_(dashboard.degraded)).to_be_visible()
     dashboard.forgive()
+
+
+def test_a_reset_says_nothing_of_an_arm_that_is_disconnected_and_the_screen_at_the_arm_says_where_to_connect(
+    dashboard: Dashboard,
+) -> None:
+    page = dashboard.until_live()
+    page.keyboard.press("F8")
+    page.get_by_role("button", name="Reset").click()
+    reset = page.locator("[data-banner=reset]")
+    expect(reset).to_contain_text("holds its posture")
+    dashboard.service.robot.post("/disconnect")
+    expect(reset).not_to_be_attached()
+    dashboard.open("kiosk")
+    page.locator(".state").get_by_role("link", name="Live").click()
+    page.get_by_role("button", name="Connect").click()
+    expect(page.get_by_text("The queue is paused")).to_be_visible()
+    expect(reset).not_to_be_attached()

@@ -151,7 +151,7 @@ def test_what_runs_shows_its_progress_and_is_stopped_from_the_queue(dashboard: D
     expect(form.get_by_text(re.compile(r"of \d+"))).to_be_visible()
     form.get_by_role("button", name="Stop the experiment").click()
     expect(form.get_by_text("The arm is stopped.")).to_be_visible()
-    expect(form.get_by_text("cancelled", exact=True).first).to_be_visible()
+    expect(form.get_by_text("stopped", exact=True).first).to_be_visible()
     assert dashboard.mock is not None
     assert dashboard.mock.ask("state")["frozen"]
 
@@ -322,6 +322,7 @@ def test_a_run_that_ended_on_live_is_what_the_form_is_filled_with(dashboard: Das
     ramp = {"kind": "ramp", "amplitude": 0.05, "duration": 1.25}
     spec = {"name": "slow", "trajectory": ramp, "hold": 0.1}
     dashboard.service.end_of(dashboard.service.robot.post("/experiments", json={"spec": spec}).json()["id"])
+    page.get_by_role("button", name="Last result").click()
     page.get_by_role("button", name="Edit and run again").click()
     expect(page.get_by_role("textbox", name="Duration")).to_have_value("1.25")
     expect(page).to_have_url(re.compile("#/experiments$"))

@@ -72,7 +72,7 @@ def test_without_the_service_the_shell_opens_and_shows_nothing_as_live(browser: 
         assert set(sources) == {"network"}  # no request of the API, a stop least of all, waits for the worker
     page.reload()
     expect(page.get_by_text("The service cannot be reached")).to_be_visible()
-    expect(page.locator("table, canvas, .panels")).to_have_count(0)
+    expect(page.locator("table, canvas, [data-kind]")).to_have_count(0)
     assert faults_of(page) == []
     page.keyboard.press("F8")
     expect(page.locator("[role=alert] [data-stop]")).to_contain_text("NOT DELIVERED")

@@ -27,7 +27,7 @@ def _add(page: Page, title: str) -> None:
 
 def _places(page: Page) -> dict[str, dict[str, float]]:
     found: dict[str, dict[str, float]] = page.evaluate(
-        """() => Object.fromEntries([...document.querySelectorAll('.panels > [data-kind]')].map((one) =>
+        """() => Object.fromEntries([...document.querySelectorAll('.place[data-kind]')].map((one) =>
             [one.dataset.kind, one.getBoundingClientRect().toJSON()]))"""
     )
     return found
@@ -138,12 +138,12 @@ def test_a_phone_arranges_by_order_and_shows_every_kind(dashboard: Dashboard) ->
         {"name": "every.json", "mimeType": "application/json", "buffer": json.dumps(layout).encode()}
     )
     expect(page.get_by_text("no plug-in with the panel “Gone”")).to_be_visible()
-    expect(page.locator(".panels > [data-kind]")).to_have_count(len(KINDS) + 1)
+    expect(page.locator(".place[data-kind]")).to_have_count(len(KINDS) + 1)
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     assert faults_of(page) == []
     page.get_by_role("button", name="Arrange panels").click()
     assert faults_of(page) == []
     page.get_by_role("button", name="Notes up").click()
     page.get_by_role("button", name="Save").click()
-    kinds = page.locator(".panels > [data-kind]").evaluate_all("all => all.map((one) => one.dataset.kind)")
+    kinds = page.locator(".place[data-kind]").evaluate_all("all => all.map((one) => one.dataset.kind)")
     assert kinds.index("notes") < kinds.index("faults")

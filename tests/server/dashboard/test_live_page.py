@@ -40,6 +40,8 @@ def test_numbers_are_those_of_the_robot_with_unit_and_age_and_a_joint_that_is_hi
 
 def test_an_experiment_is_seen_to_run_and_its_motion_in_the_numbers(dashboard: Dashboard) -> None:
     page = dashboard.until_live()
+    top = "document.querySelector('.place[data-kind=charts]').offsetTop"
+    place = page.evaluate(top)
     before = _number(_cell(page, 1, 0))
     amplitude = -0.1 if before > HOME_DEGREES else 0.1  # earlier tests may have left the arm where a ramp would end
     ramp = {"kind": "ramp", "amplitude": amplitude, "duration": 0.5}
@@ -52,6 +54,11 @@ def test_an_experiment_is_seen_to_run_and_its_motion_in_the_numbers(dashboard: D
     expect(page.get_by_text("Nothing is running or waiting.")).to_be_visible()
     expect(page.get_by_role("banner").get_by_text("moving")).not_to_be_attached()
     assert abs(_number(_cell(page, 1, 0)) - before) > 2
+    result = page.get_by_role("button", name="Last result")
+    expect(result).to_be_visible()
+    assert page.evaluate(top) == place  # the end of a run moves nothing from under a hand
+    result.click()
+    expect(page.get_by_role("region", name="Result of ramp")).to_be_visible()
 
 
 def test_a_run_that_failed_is_told_until_it_was_read(dashboard: Dashboard) -> None:

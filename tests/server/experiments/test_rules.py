@@ -27,7 +27,7 @@ from server.experiments.schedule import (
     together,
     zone_here,
 )
-from server.experiments.states import Event, IllegalEventError, Waiting, advance, after_restart, next_due
+from server.experiments.states import Ending, Event, IllegalEventError, Waiting, advance, after_restart, next_due
 from server.problems import ProblemError
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
@@ -77,6 +77,12 @@ TestExperimentLife.settings = settings(max_examples=50, stateful_step_count=20) 
 def test_what_waits_can_only_be_taken_or_cancelled(event: Event) -> None:
     with pytest.raises(IllegalEventError, match=f"an experiment that is queued cannot be {event}"):
         advance("queued", event)
+
+
+def test_a_run_that_left_a_part_of_its_trace_was_stopped_and_any_other_is_called_by_its_state() -> None:
+    assert Ending(Event.STOPPED, "by anna", "stopped").word == "stopped"
+    assert Ending(Event.STOPPED, "cancelled before it moved").word == "cancelled"
+    assert Ending(Event.FAULT, "joint 2", "fault").word == "failed"
 
 
 waiting = st.lists(

@@ -4462,7 +4462,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "start" | "ramp_start" | "ramp_end" | "reversal" | "gains" | "limit" | "pause" | "resume" | "retry" | "missing" | "missed_set_point" | "restart" | "link_lost" | "stop" | "fault" | "note" | "end";
+            kind: "start" | "ramp_start" | "ramp_end" | "reversal" | "waypoint" | "gains" | "limit" | "pause" | "resume" | "retry" | "missing" | "missed_set_point" | "restart" | "link_lost" | "stop" | "fault" | "note" | "end";
             /** Message */
             message: string;
         };
@@ -5301,7 +5301,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "start" | "ramp_start" | "ramp_end" | "reversal" | "gains" | "limit" | "pause" | "resume" | "retry" | "missing" | "missed_set_point" | "restart" | "link_lost" | "stop" | "fault" | "note" | "end";
+            kind: "start" | "ramp_start" | "ramp_end" | "reversal" | "waypoint" | "gains" | "limit" | "pause" | "resume" | "retry" | "missing" | "missed_set_point" | "restart" | "link_lost" | "stop" | "fault" | "note" | "end";
             /** Message */
             message: string;
             /** Tick */
@@ -6412,7 +6412,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "start" | "ramp_start" | "ramp_end" | "reversal" | "gains" | "limit" | "pause" | "resume" | "retry" | "missing" | "missed_set_point" | "restart" | "link_lost" | "stop" | "fault" | "note" | "end";
+            kind: "start" | "ramp_start" | "ramp_end" | "reversal" | "waypoint" | "gains" | "limit" | "pause" | "resume" | "retry" | "missing" | "missed_set_point" | "restart" | "link_lost" | "stop" | "fault" | "note" | "end";
             /** Message */
             message: string;
             /** Tick */

@@ -23,6 +23,12 @@ describe('counters of the link', () => {
     expect(retries(health.heard(told({ requests: 10, retries: 1 }), 122))).toMatchObject({ lately: 0 }); // a new link
   });
 
+  it('say over how many seconds they are: a minute, or as long as this page hears of the link', () => {
+    const health = new LinkHealth();
+    const over = [0, 8, 59, 62, 100, 101].map((at) => health.heard(told({ requests: at }), at).over);
+    expect(over).toEqual([0, 8, 59, 62, 92, 93]);
+  });
+
   it('have no round trip before the first', () => {
     const health = new LinkHealth();
     expect(health.heard(told({}), 0).roundTrip).toBeNull();

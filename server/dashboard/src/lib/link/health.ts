@@ -10,7 +10,7 @@ export interface Figure {
   /** What it counts, for whoever points at it. */
   meaning: string;
   total: number;
-  /** How many came in the last minute, or since the page was opened. */
+  /** How many came in the last `over` seconds. */
   lately: number;
 }
 
@@ -20,6 +20,8 @@ export interface Health {
   /** What was wrong, and what a person can do; empty where nothing is. */
   why: string;
   figures: readonly Figure[];
+  /** s that `lately` looks back: a minute, or since this page hears of the link. */
+  over: number;
   /** ms of the slowest of a hundred replies; null before the first. */
   roundTrip: number | null;
 }
@@ -64,7 +66,14 @@ interface Told {
 }
 
 /** What is said before anything was told of the link, and without a connection to the service. */
-export const NOT_OPEN: Health = { tone: 'quiet', text: 'not open', why: '', figures: [], roundTrip: null };
+export const NOT_OPEN: Health = {
+  tone: 'quiet',
+  text: 'not open',
+  why: '',
+  figures: [],
+  over: 0,
+  roundTrip: null,
+};
 
 /** Remembers what the counters were, to tell what is going on now from what once was. */
 export class LinkHealth {
@@ -79,7 +88,11 @@ export class LinkHealth {
     this.past.push({ at, counters, ticks });
     while (this.past.length > 1 && (this.past[1]?.at ?? at) < at - LATELY) this.past.shift();
     const trip = counters['round_trip_p99_s'];
-    const told = { figures: this.figures(this.past[0]!), roundTrip: trip === undefined ? null : trip * 1000 };
+    const told = {
+      figures: this.figures(this.past[0]!),
+      over: Math.round(at - this.past[0]!.at),
+      roundTrip: trip === undefined ? null : trip * 1000,
+    };
     if (state === 'none' || state === 'lost') {
       [this.past, this.degradedAt] = [[], -Infinity];
       return { ...told, ...(state === 'none' ? NOT_OPEN : { tone: 'bad', text: 'lost', why: '' }) };

@@ -1,7 +1,16 @@
 import { describe, expect, it } from 'vitest';
-import type { QueueStatus, RobotMessage, ServiceEvent } from '../api/types';
+import type { Experiment, QueueStatus, RobotMessage, ServiceEvent } from '../api/types';
 import { timeOfDay } from '../format';
-import { newestEvents, together, withPauser, withStopper, withYou } from './events';
+import {
+  endReason,
+  eventText,
+  newestEvents,
+  timesText,
+  together,
+  withPauser,
+  withStopper,
+  withYou,
+} from './events';
 
 const event = (kind: string, at: string, actor: string | null = 'local'): ServiceEvent =>
   ({ kind, at, actor }) as ServiceEvent;
@@ -17,12 +26,27 @@ it('events are told once, the newest first, however they were learnt', () => {
   expect(newestEvents([], numbered(2, 1), 5)).toHaveLength(2);
 });
 
-it('one press is one row, however often it was sent', () => {
-  expect(together(['stop', 'stop', 'reset', 'stop'], (row) => row)).toEqual([
-    { row: 'stop', times: 2 },
-    { row: 'reset', times: 1 },
-    { row: 'stop', times: 1 },
+it('rows are by their times, and one press is one row, however often it was sent', () => {
+  const rows = ['reset', 'stop', 'stop', 'stop'].map((kind, index) =>
+    event(kind, `2026-11-30T12:00:0${index}Z`),
+  );
+  // One that counts repeats is told after those that came since the last of them.
+  const groups = together([rows[0]!, rows[3]!, rows[2]!, rows[1]!], ({ kind }) => kind);
+  expect(groups.map(({ row, all }) => [row, all.length])).toEqual([
+    [rows[3], 3],
+    [rows[0], 1],
   ]);
+  expect(groups.map((one) => timesText(one, one.all.length))).toEqual([
+    `, 3 times since ${timeOfDay(rows[1]!.at)}`,
+    '',
+  ]);
+});
+
+it('an event says what it is about where its kind is not shown', () => {
+  const said = (kind: string, text: string): string => eventText({ kind, text });
+  expect(said('queue', 'paused')).toBe('the queue was paused');
+  expect(said('connection', 'connected')).toBe('the arm was connected');
+  expect(said('stop', 'stopped by the board')).toBe('stopped by the board');
 });
 
 describe('who stopped the arm or paused the queue', () => {
@@ -56,10 +80,23 @@ describe('who stopped the arm or paused the queue', () => {
     expect(withYou('cancelled by anna', you)).toBe('cancelled by anna');
   });
 
+  it('is why a run ended that went on then', () => {
+    const run = { reason: 'on request', started: '2026-11-30T11:59:50Z', ended: LATER } as Experiment;
+    expect(endReason(run, [event('stop', NOON)], you)).toBe(stop);
+    expect(endReason({ ...run, ended: '2026-11-30T11:59:55Z' }, [event('stop', NOON)], you)).toBe(
+      'on request',
+    );
+    expect(endReason({ ...run, reason: 'cancelled by local' }, [event('stop', NOON)], you)).toBe(
+      'cancelled by you',
+    );
+  });
+
   it('is left to the service where nobody did through it', () => {
     expect(withStopper(stopped, [event('reset', LATER), event('stop', NOON)], you)).toBe(stopped);
     expect(withStopper({ ...stopped, arm: 'fault' }, [event('stop', NOON)], you)?.cause).toBe('on request');
     const resumedBefore = event('queue', '2026-11-30T11:59:59Z');
     expect(withPauser(paused, [event('queue', NOON, null), resumedBefore], you)).toBe(paused);
+    const stoppedBefore = event('stop', '2026-11-30T11:59:57Z');
+    expect(withPauser(paused, [resumedBefore, stoppedBefore], you)).toBe(paused);
   });
 });

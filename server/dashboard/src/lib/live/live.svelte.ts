@@ -25,12 +25,12 @@ import type {
   SystemStatus,
 } from '../api/types';
 import { LinkHealth, NOT_OPEN } from '../link/health';
-import { armNow } from '../stop/standing';
+import { armNow, isResetOver } from '../stop/standing';
 import { fleet } from '../fleet/fleet.svelte';
 import { stop } from '../stop/stop.svelte';
 import { ServiceClock, STALE_AFTER } from './age';
 import { asked, askSystem, newSocket } from './asked';
-import { newestEvents, withPauser, withStopper, withYou } from './events';
+import { endReason, newestEvents, withPauser, withStopper } from './events';
 import { SampleRate } from './rate';
 import { Recording } from './recording';
 
@@ -183,7 +183,7 @@ class Live {
 
   /** Why an experiment ended, as the person at this page reads it. */
   reasonOf(ended: Experiment): string {
-    return withYou(ended.reason, (name) => this.who(name));
+    return endReason(ended, this.events, (name, at) => this.who(name, at));
   }
 
   /** Time of day at the service, ms since 1970. Reactive: it grows. */
@@ -314,6 +314,7 @@ class Live {
         break;
       case 'robot':
         this.markStop(message);
+        if (isResetOver(this.toldRobot, message)) stop.isReset = false;
         this.toldRobot = message;
         this.tellStop();
         break;

@@ -15,7 +15,13 @@ const event = (kind: RecordEventMessage['kind'], host_time: number, message = ''
 
 it('marks what matters with a name, what comes often with a tick, and nothing outside the window', () => {
   const marks = marksOf(
-    [event('ramp_start', 1, 'ramp starts'), event('limit', 2), event('retry', 3), event('stop', 9)],
+    [
+      event('ramp_start', 1, 'ramp starts'),
+      event('waypoint', 1, 'via point 1 of 2'),
+      event('limit', 2),
+      event('retry', 3),
+      event('stop', 9),
+    ],
     0,
     5,
   );

@@ -34,10 +34,16 @@ export function markOf(event: RecordEvent, x: number): ChartMarker {
   return { x, label, tone: FLAGS[event.kind]?.tone ?? 'plain' };
 }
 
+/** Kinds of which no mark stands in a chart: they are read, or there are dozens of them. */
+const UNMARKED: readonly Kind[] = ['note', 'waypoint'];
+
+/** Whether a mark stands in a chart for it. */
+export const isMarked = ({ kind }: Pick<RecordEventMessage, 'kind'>): boolean => !UNMARKED.includes(kind);
+
 /** Marks of these events within [from, to]. */
 export function marksOf(events: readonly RecordEventMessage[], from: number, to: number): ChartMarker[] {
   return events
-    .filter((event) => event.host_time >= from && event.host_time <= to && event.kind !== 'note')
+    .filter((event) => event.host_time >= from && event.host_time <= to && isMarked(event))
     .map((event) => markOf(event, event.host_time));
 }
 

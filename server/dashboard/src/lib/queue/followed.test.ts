@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { Experiment } from '../api';
-import { standingOf, troubleOf, type Lists } from './followed';
+import { endOf, standingOf, troubleOf, type Lists } from './followed';
 
 const one = (id: string, state = 'queued') => ({ id, state }) as Experiment;
 const nothing: Lists = { waiting: [], running: null, ended: [] };
@@ -24,6 +24,15 @@ describe('the run that was just sent', () => {
       tone: 'bad',
       text: 'failed',
     });
+  });
+
+  it('was stopped where it has left a part of its trace, and cancelled where it has not', () => {
+    const stopped = { ...one('a', 'cancelled'), outcome: 'stopped' } as Experiment;
+    expect(standingOf('a', { ...nothing, ended: [stopped] })).toMatchObject({
+      tone: 'warn',
+      text: 'stopped',
+    });
+    expect(endOf(one('a', 'cancelled'))).toBe('cancelled');
   });
 
   it('is not known before the lists have been read', () => {

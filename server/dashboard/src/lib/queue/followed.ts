@@ -18,16 +18,26 @@ export interface StandingOfRun {
   said: string;
 }
 
-const TONES = { done: 'good', failed: 'bad', cancelled: 'quiet', interrupted: 'warn' } as const;
+const TONES = {
+  done: 'good',
+  failed: 'bad',
+  cancelled: 'quiet',
+  stopped: 'warn',
+  interrupted: 'warn',
+} as const;
+
+/** How an experiment stands, in a word: one that was cancelled while it ran has left a part of its trace. */
+export const endOf = ({ state, outcome }: Experiment): string =>
+  state === 'cancelled' && outcome === 'stopped' ? 'stopped' : state;
 
 /** How an experiment has ended, as a tone. */
-export const toneOf = ({ state }: Experiment): StandingOfRun['tone'] =>
-  TONES[state as keyof typeof TONES] ?? 'quiet';
+export const toneOf = (ended: Experiment): StandingOfRun['tone'] =>
+  TONES[endOf(ended) as keyof typeof TONES] ?? 'quiet';
 
 export function standingOf(id: string, { waiting, running, ended }: Lists): StandingOfRun {
   const over = ended.find((one) => one.id === id);
   if (over !== undefined) {
-    return { state: 'ended', experiment: over, tone: toneOf(over), text: over.state, said: '' };
+    return { state: 'ended', experiment: over, tone: toneOf(over), text: endOf(over), said: '' };
   }
   if (running?.id === id)
     return { state: 'running', experiment: running, tone: 'busy', text: 'running', said: '' };

@@ -1,5 +1,6 @@
 import { describe, expect, it } from 'vitest';
-import { armNow, type ArmNow, type Standing, StopStanding, SURE_AFTER } from './standing';
+import { armNow, type ArmNow, isResetOver, type Standing, StopStanding, SURE_AFTER } from './standing';
+import type { RobotMessage } from '../api/types';
 import type { StopState } from './stop';
 
 /** What stands after this has been told, each for `every` s. */
@@ -67,4 +68,14 @@ describe('a stop that was sent and not confirmed', () => {
     expect(follow('delivered', ['stopped', 'free']).at(-1)).toBe('past');
     expect(follow('delivered', ['free', 'free'], 60).at(-1)).toBe('holds');
   });
+});
+
+it('a reset holds until the connection is gone or the arm is stopped again, and its own stop may be told late', () => {
+  const robot = (arm: string, connection = 'connected'): RobotMessage =>
+    ({ arm, connection }) as RobotMessage;
+  expect(isResetOver(robot('stopped'), robot('stopped'))).toBe(false);
+  expect(isResetOver(robot('stopped'), robot('idle'))).toBe(false);
+  expect(isResetOver(robot('idle'), robot('fault'))).toBe(true);
+  expect(isResetOver(robot('idle'), robot('idle', 'lost'))).toBe(true);
+  expect(isResetOver(robot('idle'), robot('disconnected', 'disconnected'))).toBe(true);
 });

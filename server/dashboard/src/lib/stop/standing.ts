@@ -21,6 +21,18 @@ export function armNow(isHeard: boolean, robot: Pick<RobotMessage, 'connection' 
   return robot.arm === 'stopped' || robot.arm === 'fault' ? 'stopped' : 'free';
 }
 
+/**
+ * Whether a reset says nothing of the arm any more: its connection is gone, or it was stopped again. `before`: what was
+ * told last, which may still be the stop that the reset has ended.
+ */
+export function isResetOver(
+  before: Pick<RobotMessage, 'connection' | 'arm'> | null,
+  now: Pick<RobotMessage, 'connection' | 'arm'>,
+): boolean {
+  const arm = armNow(true, now);
+  return arm === 'unknown' || (arm === 'stopped' && armNow(true, before) !== 'stopped');
+}
+
 /** Follows the arm from the moment at which it was told what became of a stop. */
 export class StopStanding {
   private standing: Standing = 'holds';

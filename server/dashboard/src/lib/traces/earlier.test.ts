@@ -11,7 +11,7 @@ it('tells a run beside earlier ones of the same experiment, and nothing where th
   const now = figures(3.9, 34);
   expect(besideEarlier(now, [], 'V')).toBe('');
   expect(besideEarlier(now, [figures(2.1, 34)], 'V')).toBe(
-    'Beside the earlier run, too few to judge by: J2 largest error 3.90°, was 2.10°.',
+    'Differs from the earlier run (too few to judge by): J2 largest error 3.90°, was 2.10°.',
   );
   const usual = [figures(3.8, 33), figures(4, 34), figures(4.1, 35)];
   expect(besideEarlier(now, usual, 'V')).toMatch(/^As in the 3 earlier runs/);

@@ -71,7 +71,7 @@ export function besideEarlier(
   );
   if (told.length === 0) return `As in ${runs} of this experiment: error and drive are within their range.`;
   const verdict =
-    earlier.length < FEWEST ? `Beside ${runs}, too few to judge by` : `Outside the range of ${runs}`;
+    earlier.length < FEWEST ? `Differs from ${runs} (too few to judge by)` : `Outside the range of ${runs}`;
   return `${verdict}: ${told.join('; ')}.`;
 }
 
