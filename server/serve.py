@@ -7,6 +7,7 @@ disk. Only threads and processes that cannot be interrupted are left.
 
 from __future__ import annotations
 
+import errno
 import logging
 import os
 import signal
@@ -114,9 +115,10 @@ def _both(section: ServiceSettings) -> tuple[socket.socket, socket.socket]:
 
 
 CHOOSE = {
-    "server.port": "Choose another --port.",
-    "server.stop_port": "Stops are taken at the port after --port: choose another one, or set server.stop_port.",
+    "server.port": ": choose another --port",
+    "server.stop_port": ": stops are taken at the port after --port: choose another one, or set server.stop_port",
 }
+"""What to do where a port is taken, or not for this user."""
 
 
 def _bound(host: str, port: int, setting: str) -> socket.socket:
@@ -130,7 +132,9 @@ def _bound(host: str, port: int, setting: str) -> socket.socket:
         if listener is not None:
             listener.close()
         why = error.strerror if isinstance(error, OSError) and error.strerror else error
-        line = f"server.host {host}, {setting} {port}: cannot be listened at: {why}. {CHOOSE[setting]}"
+        is_of_port = isinstance(error, OSError) and error.errno in (errno.EADDRINUSE, errno.EACCES)
+        choose = CHOOSE[setting] if is_of_port else ""
+        line = f"server.host {host}, {setting} {port}: cannot be listened at: {why}{choose}"
         raise ReachError(line) from error
     return listener
 

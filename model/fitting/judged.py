@@ -2,9 +2,9 @@
 
 A start posture within the sensor's error, a potentiometer's bend within its linearity, the form of friction near rest
 and the phase of a disturbance belong to no model: no machine file states them, and no fit keeps them. A right model
-needs them all the same: on a
-ramp of the mock the form of friction alone moves the place where a joint comes to rest by two counts. So they are
-fitted to the records, with all numbers of the model held, before its residual is compared with noise.
+needs them all the same: on a ramp of the mock the form of friction alone moves the place where a joint comes to rest by
+two counts. So they are fitted to the records, with all numbers of the model held, before its residual is compared with
+noise.
 
 Noise enters the control loop, so a right model leaves more than the noise of a reading. The model itself simulates the
 records with noise and rounding, and what it leaves of these is the noise of fits, validations and comparisons.
@@ -19,7 +19,7 @@ import numpy as np
 
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import NoController
-from daq.contracts.progress import Never
+from daq.contracts.progress import Cancel, Never
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.fitting.choice import with_nuisances
@@ -45,10 +45,12 @@ LEAST_MOTION = 3.0
 """Motion, in noises of a reading, above which more than that motion may remain of a record."""
 
 
-def left_beside_nuisances(model: Model, traces: Sequence[Trace]) -> list[JointLeft]:
+def left_beside_nuisances(model: Model, traces: Sequence[Trace], cancel: Cancel | None = None) -> list[JointLeft]:
     """Returns what a model leaves of the positions of records, joint by joint, once its nuisances are fitted to them.
 
-    Raises TraceError, SpecError: for records that cannot be simulated.
+    Raises:
+        TraceError, SpecError: for records that cannot be simulated.
+        CancelledError: when cancelled.
     """
     options = FitOptions()
     loop: Loop = "open" if isinstance(model.machine.controller, NoController) else "closed"
@@ -59,7 +61,7 @@ def left_beside_nuisances(model: Model, traces: Sequence[Trace]) -> list[JointLe
     values = np.array([u.start for u in problem.unknowns])
     if nuisances:
         search = Search(options.robust, options.tolerance, MOST_EVALUATIONS)
-        values = solve(problem, [white(d) for d in floor], values, Never(), search, None).values
+        values = solve(problem, [white(d) for d in floor], values, cancel or Never(), search, None).values
     return joints_left(problem, values, problem.evaluate(values, derivatives=False), traces)
 
 

@@ -85,14 +85,14 @@ class SimulatedProblem:
 
         A search that begins on the wrong half of a turn ends without the disturbance.
         """
-        problem, values = self, np.array([u.start for u in self.unknowns])
+        values = np.array([u.start for u in self.unknowns])
         for k, unknown in enumerate(self.unknowns):
             if not is_phase(unknown) or unknown.trace is None:
                 continue
             costs = []
             for quarter in range(4):
                 values[k] = quarter * math.pi / 2.0
-                costs.append(float((problem.evaluate(values, derivatives=False)[unknown.trace].residual ** 2).sum()))
+                costs.append(float((self.evaluate(values, derivatives=False)[unknown.trace].residual ** 2).sum()))
             values[k] = int(np.argmin(costs)) * math.pi / 2.0
         begun = tuple(replace(u, start=float(v)) for u, v in zip(self.unknowns, values, strict=True))
         return replace(self, unknowns=begun)
@@ -153,8 +153,9 @@ class SimulatedProblem:
         return {u.name: float(v) for u, v in zip(self.unknowns, values, strict=True)}
 
     def _state(self, values: Floats) -> tuple[Floats, Floats]:
-        """Returns the flat vector and the initial state of each record for values of the unknowns."""
-        vectors = np.tile(self.model.vector, (len(self.records), 1))
+        """Returns the flat vectors (t, layout size) and the initial states (t, n, 2) of the records for values of the
+        unknowns."""
+        vectors, named = np.tile(self.model.vector, (len(self.records), 1)), self._named(values)
         initials = np.array([record.inputs.initial for record in self.records])
         for value, unknown in zip(values, self.unknowns, strict=True):
             place = unknown.parameter.initial
@@ -163,6 +164,6 @@ class SimulatedProblem:
                 for t in range(len(initials)) if unknown.trace is None else (unknown.trace,):
                     initials[t][place] += value
         for t, vector in enumerate(vectors):
-            for p, value in turned_pairs(self.model, self._named(values), t):
+            for p, value in turned_pairs(self.model, named, t):
                 vector[list(p.slots)] = value
         return vectors, initials

@@ -94,7 +94,7 @@ def validate_by_distortion(
     )
     errors = error.by_joint(varied.best[None])[0]
     distortions = [_distortion(p, d, damping_ratio) for p, d in zip(varied.parameters, doublings, strict=True)]
-    left = [one for one in left_beside_nuisances(model, traces) if one.joint in error.outputs]
+    left = [one for one in left_beside_nuisances(model, traces, cancel) if one.joint in error.outputs]
     verdict = RecordVerdict.of(model, left, sum(map(len, error.traces)))
     return Fidelity(
         model=model.identity,

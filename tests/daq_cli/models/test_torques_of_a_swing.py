@@ -286,6 +286,16 @@ def test_an_effect_file_is_used_by_compare_and_validate(daq: CommandLine, dragge
     assert [p["name"] for p in json.loads(daq(*words).out)["fidelity"]["parameters"]] == ["joint1.air_drag.coefficient"]
 
 
+def test_a_model_that_leaves_more_than_noise_is_sent_to_a_diagnosis(daq: CommandLine, beginning: Path) -> None:
+    """The arm swings against drag that its machine file does not have."""
+    words = ("validate", SINGLE_AXIS, beginning, "--parameters", "link1.mass")
+    (left,) = json.loads(daq(*words, "--json").out)["fidelity"]["left"]
+    assert left["rms"] > 2.0 * left["noise"]
+    shown = daq(*words).out
+    assert "next: daq diagnose, with the same model and traces" in shown
+    assert f"{left['rms'] / left['noise']:.2f}" in shown
+
+
 def test_a_model_that_needs_an_effect_file_names_it(daq: CommandLine, dragged: Path, beginning: Path) -> None:
     forget()
     daq("simulate", dragged, beginning).complains(2, "air_drag.py", "--effect-file")

@@ -58,7 +58,7 @@ function labelOf(kinds: readonly string[], place: number): string {
   return kind === 'refitted' ? 'all' : kind;
 }
 
-/** A share of the variance beyond noise that is gone, in percent, as the service writes it: “all” for all of it, never rounded up to 100 %. */
+/** A share of the variance beyond noise that is gone, in percent: “all” for all of it, never rounded up to 100 %. */
 export function goneText(share: number): string {
   return share >= 1 ? 'all' : `${fixed(Math.min(100 * share, 99.9), 1)} %`;
 }

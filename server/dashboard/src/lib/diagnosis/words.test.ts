@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { toneOfVerdict } from './words';
+import { notesApart, nothingNext, toneOfVerdict } from './words';
 
 describe('the tone of a verdict', () => {
   it('is good where nothing was found on joints that could be examined', () => {
@@ -16,4 +16,15 @@ describe('the tone of a verdict', () => {
     expect(toneOfVerdict({ verdict: 'named', not_examined: [2], notes_data: [] })).toBe('good');
     expect(toneOfVerdict({ verdict: 'unknown-effect', not_examined: [], notes_data: [] })).toBe('bad');
   });
+});
+
+it('to run next is nothing, but not without the warnings of an answer', () => {
+  const note = (warning: boolean) => ({ kind: 'torque-left' as const, values: {}, warning });
+  for (const verdict of ['named', 'nothing-significant'] as const) {
+    const said = (warning: boolean): string =>
+      nothingNext({ verdict, suspicion: null, notes_data: [note(warning)] });
+    expect(said(false)).toMatch(/^Nothing: /);
+    expect(said(true)).toContain('Read the warnings');
+  }
+  expect(notesApart({ notes: ['a', 'b'], notes_data: [note(false), note(true)] })).toEqual([['b'], ['a']]);
 });

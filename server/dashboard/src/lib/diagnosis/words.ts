@@ -48,6 +48,15 @@ export function listed(names: readonly string[], last = 'and'): string {
   return `${names.slice(0, -1).join(', ')} ${last} ${names.at(-1) ?? ''}`;
 }
 
+/** The notes of an answer: those that warn, and the others. */
+export function notesApart(found: Pick<DiagnosisData, 'notes' | 'notes_data'>): [string[], string[]] {
+  const isWarning = (index: number): boolean => found.notes_data?.[index]?.warning ?? false;
+  return [
+    found.notes.filter((_, index) => isWarning(index)),
+    found.notes.filter((_, index) => !isWarning(index)),
+  ];
+}
+
 /** What to do next where no experiment is proposed. */
 export function nothingNext(found: Pick<DiagnosisData, 'verdict' | 'suspicion' | 'notes_data'>): string {
   if (found.suspicion) {
@@ -62,7 +71,7 @@ export function nothingNext(found: Pick<DiagnosisData, 'verdict' | 'suspicion' |
     return 'Diagnose the other joints too: the search was limited.';
   if (found.verdict === 'nothing-significant')
     return isDoubted
-      ? 'No experiment is proposed. Read the warnings: no known effect accounts for them.'
+      ? 'No experiment is proposed. Read the warnings: no effect that was tried explains them.'
       : 'Nothing: no effect has the evidence to be named.';
   if (found.verdict === 'check-the-record')
     return 'Check what is doubted about the records, then diagnose again.';
