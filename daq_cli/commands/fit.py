@@ -257,6 +257,7 @@ def _print_json(found: FitResult, agreement: Sequence[ModelAgreement], out: Path
 
 
 def _print(found: FitResult, agreement: Sequence[ModelAgreement], base: BaseParameters | None) -> None:
+    from model.comparison.agreement import ALONE
     from model.reports.motion import AGREEMENT, agreement_table
 
     print_record(found.record)
@@ -271,6 +272,7 @@ def _print(found: FitResult, agreement: Sequence[ModelAgreement], base: BasePara
         print_prose(headline(base))
     print()
     print_rows(agreement_table(agreement).only(*AGREEMENT))
+    print_prose(ALONE)
     if not found.converged:
         print(f"the search did not converge: {found.message}")
     print_on_the_edge(found.on_the_edge)

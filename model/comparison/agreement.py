@@ -9,6 +9,12 @@ from typing import Literal
 from daq.contracts.frozen import FrozenRecord
 from model.machine_model.model import Model
 
+ALONE = (
+    "These errors are of the model alone. A verdict on it first fits start posture, bends and the form of friction "
+    "near rest."
+)
+"""Stands with errors of a comparison where a verdict on the same records is shown, whose errors may be smaller."""
+
 
 class JointAgreement(FrozenRecord):
     """One joint over one or more traces.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from model.blocks import Cell, Picture, Section, Table, numbers
-from model.comparison.agreement import JointAgreement, ModelAgreement
+from model.comparison.agreement import ALONE, JointAgreement, ModelAgreement
 from model.comparison.compare import TraceSignals
 from model.reports.figures import COLOURS, INK, MODEL_COLOURS, QUIET, as_label, band, baseline, drawn, panels, thinned
 from model.reports.page import trace_names
@@ -142,7 +142,7 @@ def agreement_table(models: Sequence[ModelAgreement]) -> Table:
         tuple(rows),
         "Measured − simulated over all samples of these traces. Noise is the error of a right model: the "
         "sensor's noise and rounding in the control loop. Of the motion: rms of the residual over that of the "
-        "motion about its mean.",
+        f"motion about its mean. {ALONE}",
     )
 
 
